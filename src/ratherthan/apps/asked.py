@@ -1,0 +1,139 @@
+"""A `Wanted` and the options of a question enter; problems, solutions, explanations and tables leave.
+
+What every command does first, in an order in which a slip of the person is told before anything long begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from ratherthan.apps.options import Wanted
+from ratherthan.apps.waiting import waiting
+
+if TYPE_CHECKING:
+    from ratherthan.apps.columns import Column
+    from ratherthan.explain import Explanation, Question
+    from ratherthan.model.objective import Objective, Threshold
+    from ratherthan.model.problem import Problem
+    from ratherthan.solve import Solution
+
+__all__ = ["answer_of", "explanation_of", "factor_table_of", "problem_of"]
+
+
+def problem_of(wanted: Wanted) -> Problem:
+    """Read the model, from the state and with the words that are wanted; its objective is still the source's own."""
+    from ratherthan.io import read
+
+    with waiting(f"Reading {wanted.source}"):
+        problem = read(wanted.source, constants=wanted.constants, start=wanted.start)
+    if wanted.lexicon is None:
+        return problem
+    from ratherthan.apps.words import read_lexicon
+
+    return replace(problem, lexicon=read_lexicon(wanted.lexicon, problem.lexicon))
+
+
+def answer_of(wanted: Wanted, *, policy: str | None, minimise_q: bool) -> tuple[Solution, Objective | Threshold]:
+    """Return the solution of what is wanted, and the property itself: it may be a yes-or-no question."""
+    from ratherthan.model.objective import Threshold
+    from ratherthan.model.states import start_of
+
+    problem = problem_of(wanted)
+    wish = _wish(wanted, problem)
+    start_of(problem.mdp)
+    problem = replace(problem, objective=wish.objective if isinstance(wish, Threshold) else wish)
+    return _solved(problem, policy, minimise_q=minimise_q), wish
+
+
+def explanation_of(wanted: Wanted, given: Mapping[str, Any]) -> Explanation:
+    """Return the explanation that the options of ``ratherthan explain`` ask for."""
+    from ratherthan.explain import explain
+    from ratherthan.model.states import start_of, state_number
+
+    problem = _explainable(wanted)
+    state = given["state"]
+    if state is None:
+        start_of(problem.mdp)
+    asked = _question(given, None if state is None else state_number(problem.mdp, state))
+    return explain(_solved(problem, given["policy"], minimise_q=given["minimise_q"]), asked=asked)
+
+
+def factor_table_of(wanted: Wanted, given: Mapping[str, Any]) -> dict[str, Column]:
+    """Return the table that the options of ``ratherthan factors`` ask for."""
+    from ratherthan.apps.columns import factor_columns, route_states
+    from ratherthan.explain import Factors
+    from ratherthan.model.states import start_of, state_number
+
+    problem = _explainable(wanted)
+    asked, start = _question(given, None), start_of(problem.mdp)
+    states = {state_number(problem.mdp, state) for state in given["states"]}
+    solution = _solved(problem, given["policy"], minimise_q=given["minimise_q"])
+    factors = Factors(solution=solution, asked=asked)
+    with waiting("Counting the decisions left open"):
+        everywhere = given["constrictiveness"] == "all"
+        return factor_columns(factors, None if everywhere else states | route_states(factors, start))
+
+
+def _wish(wanted: Wanted, problem: Problem) -> Objective | Threshold:
+    """Return what is wanted: the property that was given, else the one that the source makes plain."""
+    from ratherthan.errors import PropertyError
+    from ratherthan.model.property import choose_objective
+
+    if len(wanted.properties) > 1:
+        raise PropertyError(
+            f"One property must be given at a time, got {len(wanted.properties)}. Give --property once."
+        )
+    return choose_objective(problem, wanted.properties[0] if wanted.properties else None)
+
+
+def _explainable(wanted: Wanted) -> Problem:
+    """Return the problem with an objective that has a best value."""
+    from ratherthan.errors import PropertyError
+    from ratherthan.model.objective import Threshold
+
+    problem = problem_of(wanted)
+    wish = _wish(wanted, problem)
+    if isinstance(wish, Threshold):
+        raise PropertyError(
+            f"A property must ask for a best value (=?) to be explained, got the yes-or-no question '{wish.text}'. "
+            f"Ask for '{wish.objective.text}'; the question itself is answered by: ratherthan solve.",
+            text=wish.text,
+        )
+    return replace(problem, objective=wish)
+
+
+def _question(given: Mapping[str, Any], state: int | None) -> Question:
+    from ratherthan.explain import question
+    from ratherthan.factors import Search
+
+    factors = given.get("factors")
+    return question(
+        given.get("kind"),
+        scope=given.get("scope"),
+        factors=None if factors is None else [name.strip() for name in factors.split(",") if name.strip()],
+        state=state,
+        rather_than=given.get("rather_than"),
+        alpha=given["alpha"],
+        omega=given["impact"] == "omega",
+        policy_values=given["values"] == "policy",
+        search=Search(horizon=given["horizon"], toward_goal=given["toward"] == "goal"),
+        detail=given.get("detail", False),
+    )
+
+
+def _solved(problem: Problem, policy: str | None, *, minimise_q: bool) -> Solution:
+    """Return the optimum, or where a file with a policy is given that policy beside it."""
+    from ratherthan.errors import QuestionError
+
+    if policy is None and minimise_q:
+        raise QuestionError("--minimise-q must come with a table of action values to read: give --policy FILE, too.")
+    from ratherthan.solve import evaluate, solve
+
+    with waiting("Solving") as tell:
+        if policy is None:
+            return solve(problem, progress=tell)
+        from ratherthan.io.policies import read_policy
+
+        return evaluate(problem, read_policy(policy, problem.mdp, minimise_q=minimise_q), progress=tell)

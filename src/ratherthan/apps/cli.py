@@ -1,0 +1,58 @@
+"""The words of a command line enter, the command that they ask for is run."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import click
+
+from ratherthan.apps.door import Door, silence
+from ratherthan.apps.options import Command
+
+__all__ = ["COMMANDS", "Ratherthan", "main", "run"]
+
+COMMANDS = ("explain", "factors", "solve", "verify", "info", "convert", "examples", "completion")
+
+
+class Ratherthan(Door):
+    """The group of all commands, each loaded when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        """Return the names of the commands, in the order in which help lists them."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - click's
+        """Return one command, None where there is none of that name."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: Command = importlib.import_module(f"ratherthan.apps.commands.{cmd_name}").command
+        return command
+
+
+@click.group(
+    name="ratherthan",
+    cls=Ratherthan,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Each command has examples of its own: ratherthan explain --help",
+)
+@click.version_option(package_name="ratherthan", message="%(prog)s %(version)s")
+@click.pass_context
+def main(context: click.Context) -> None:
+    """Explain plans of Markov decision processes: why this action rather than that one.
+
+    A SOURCE is a bundled example (example:paper-5x5), a road map (.roadmap), a PRISM or JANI model, a UMB archive
+    (.umb) or a NumPy archive (.npz).
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+def run() -> None:
+    """Run the command line of this process."""
+    try:
+        main(prog_name="ratherthan")
+    except KeyboardInterrupt:
+        silence(sys.stdout, sys.stderr)
+        sys.exit(130)

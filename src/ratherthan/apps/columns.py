@@ -1,0 +1,146 @@
+"""A solution and a question enter, the table of factors leaves as columns: a row per choice, in the model's order.
+
+Columns are arrays; what is null has a mask. Names are made block by block, so that a table of millions of rows is never
+held as text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ratherthan.model.names import StateNames, spell
+
+if TYPE_CHECKING:
+    from ratherthan.explain import Factors
+    from ratherthan.model.mdp import MDP, Bools
+
+__all__ = ["BLOCK", "KEYS", "Column", "action_names", "blocks", "factor_columns", "route_states", "state_names"]
+
+KEYS = (
+    *("state", "state_name", "choice", "choice_index", "action", "impact", "action_value", "lower", "upper"),
+    *("lambda_min", "lambda_max", "responsibility", "constrictiveness", "critical", "taken"),
+)
+BLOCK = 4096
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Column:
+    """One column: an array or names by row, and where it is null."""
+
+    values: npt.NDArray[Any]  # [C]; for names the index into `names`
+    null: npt.NDArray[np.bool_] | None = None  # [C]
+    names: StateNames | None = None
+
+    def rows(self, first: int, last: int) -> list[Any]:
+        """Return rows `first` up to, not including, `last` as Python values; None where null."""
+        part = self.values[first:last]
+        if self.names is not None:
+            return state_names(self.names, part)
+        listed: list[Any] = part.tolist()
+        if self.null is not None:
+            listed = [None if gone else value for value, gone in zip(listed, self.null[first:last], strict=True)]
+        return listed
+
+
+def factor_columns(factors: Factors, states: Iterable[int] | None) -> dict[str, Column]:
+    """Return the columns of `KEYS`.
+
+    Parameters
+    ----------
+    factors : Factors
+    states : iterable of int, optional
+        Where constrictiveness is counted: everywhere if None.
+    """
+    mdp, measures, solution = factors.solution.problem.mdp, factors.measures, factors.solution
+    state = np.repeat(np.arange(mdp.states), np.diff(mdp.state_to_choices))
+    choice = np.arange(mdp.choices)
+    critical = factors.critical
+    counts, unknown = _counts(factors, state, states)
+    lower, upper = measures.lower, measures.upper
+    return {
+        "state": Column(values=state),
+        "state_name": Column(values=state, names=mdp.names),
+        "choice": Column(values=choice),
+        "choice_index": Column(values=choice - mdp.state_to_choices[state]),
+        "action": Column(values=action_names(mdp)),
+        "impact": Column(values=measures.impact),
+        "action_value": Column(values=measures.action_value),
+        "lower": Column(values=lower, null=np.isneginf(lower) & ~np.isneginf(upper)),
+        "upper": Column(values=upper, null=np.isposinf(upper) & ~np.isposinf(lower)),
+        "lambda_min": Column(values=measures.lambda_min[state]),
+        "lambda_max": Column(values=measures.lambda_max[state]),
+        "responsibility": Column(values=measures.responsibility),
+        "constrictiveness": Column(values=counts, null=unknown),
+        "critical": Column(values=critical.certain[state], null=(critical.possible & ~critical.certain)[state]),
+        "taken": Column(values=solution.policy.weights(mdp) > 0),
+    }
+
+
+def _counts(
+    factors: Factors, state: npt.NDArray[np.int64], states: Iterable[int] | None
+) -> tuple[npt.NDArray[np.int64], Bools]:
+    """Return ε of the choices of `states`, and where it is not known: elsewhere, and where bounds leave it open."""
+    wanted = np.ones(len(state), dtype=bool)
+    if states is not None:
+        wanted = np.isin(state, np.fromiter(states, dtype=np.int64))
+    counts, unknown = np.zeros(len(state), dtype=np.int64), ~wanted
+    for choice, found in factors.counts(np.flatnonzero(wanted).tolist()).items():
+        counts[choice], unknown[choice] = found.lower, found.count is None
+    return counts, unknown
+
+
+def route_states(factors: Factors, start: int) -> set[int]:
+    """Return the states of the route from `start`."""
+    from ratherthan.explain.route import policy_graph, route_from
+
+    return set(route_from(factors.solution, policy_graph(factors.solution), start).states)
+
+
+def blocks(count: int, size: int = BLOCK) -> Iterator[tuple[int, int]]:
+    """Yield (first, last) of the blocks of `count` rows; one empty block where there are none."""
+    for first in range(0, max(count, 1), size):
+        yield first, min(first + size, count)
+
+
+def action_names(mdp: MDP) -> npt.NDArray[np.object_]:
+    """Return the shown name of every choice, ``[C]``: what `MDP.action_name` says of one, for all at once."""
+    state = np.repeat(np.arange(mdp.states), np.diff(mdp.state_to_choices))
+    index = np.arange(mdp.choices) - mdp.state_to_choices[state]
+    unnamed = mdp.choice_to_action < 0
+    if any(not name for name in mdp.actions):
+        unnamed |= np.array([not name for name in mdp.actions])[mdp.choice_to_action]
+    widest = int(index[unnamed].max(initial=-1)) + 1
+    spelled = [*mdp.actions, *(f"choice {k}" for k in range(widest))]
+    code_of = {name: code for code, name in reversed(list(enumerate(spelled)))}
+    same = np.array([code_of[name] for name in spelled], dtype=np.int64)
+    code = same[np.where(unnamed, len(mdp.actions) + index, mdp.choice_to_action)]
+    names = np.array(spelled, dtype=object)[code]
+    order = np.lexsort((code, state))
+    begins = np.ones(len(order), dtype=bool)
+    begins[1:] = (state[order][1:] != state[order][:-1]) | (code[order][1:] != code[order][:-1])
+    starts = np.flatnonzero(begins)
+    earlier = np.empty(len(order), dtype=np.int64)
+    earlier[order] = np.arange(len(order)) - np.repeat(starts, np.diff([*starts, len(order)]))
+    again = np.flatnonzero(earlier)
+    names[again] = [f"{names[c]} ({earlier[c] + 1})" for c in again]
+    return names
+
+
+def state_names(names: StateNames, states: npt.NDArray[Any]) -> list[str]:
+    """Return the names of many states, column by column where they are made of variables."""
+    if names.strings is not None:
+        strings = names.strings
+        return [str(strings[state]) for state in states.tolist()]
+    if not names.variables:
+        return list(map(str, states.tolist()))
+    parts = []
+    for name, column in names.variables.items():
+        kept, at = np.unique(np.asarray(column)[states], return_inverse=True)
+        shown = np.array([f"{name}={spell(value)}" for value in kept], dtype=object)
+        parts.append(shown[at].tolist())
+    return [", ".join(row) for row in zip(*parts, strict=True)]

@@ -1,0 +1,35 @@
+"""``ratherthan solve``: a model enters, its optimal value leaves with proved bounds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from ratherthan.apps.options import Command, Wanted, option, output_options, source_options
+
+EXAMPLES = (
+    "ratherthan solve example:paper-5x5",
+    "ratherthan solve example:paper-5x5 --start 10 --format json",
+    "ratherthan solve example:delivery -p 'Pmax>=0.9 [F \"delivered\"]'",
+)
+FORMS = ("text", "json")
+
+
+@click.command("solve", cls=Command, examples=EXAMPLES, short_help="Print the best value, with bounds that are proved.")
+@source_options("properties", "constants", "start")
+@option("--policy", section="Policy", metavar="FILE", help="The value of this policy (JSON, CSV or a Q table in .npy).")
+@option("--minimise-q", section="Policy", is_flag=True, help="In a Q table the smallest number is taken.")
+@output_options(*FORMS)
+def command(wanted: Wanted, form: str | None, output: str | None, **given: Any) -> None:
+    """Print the best value of SOURCE from its start, with bounds that are proved."""
+    from ratherthan.apps.answers import value_document, value_lines
+    from ratherthan.apps.asked import answer_of
+    from ratherthan.apps.output import as_json, form_of, send, send_lines
+
+    solution, wish = answer_of(wanted, **given)
+    document = value_document(solution, wish)
+    if form_of(form, output, FORMS) == "json":
+        send([as_json(document)], output)
+    else:
+        send_lines(value_lines(document, wish), output)

@@ -1,0 +1,156 @@
+"""Decorators for options that several commands share; what was given leaves as one `Wanted`."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import click
+
+__all__ = ["Command", "Option", "Wanted", "argument", "option", "output_options", "source_options"]
+
+SECTIONS = ("Arguments", "Question", "Policy", "Source", "Output", "Other")
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Option(click.Option):
+    """An option that belongs to a section of the help page, and shows its default."""
+
+    def __init__(self, *args: Any, section: str = "Other", **settings: Any) -> None:
+        settings.setdefault("show_default", True)
+        super().__init__(*args, **settings)
+        self.section = section
+
+
+class Argument(click.Argument):
+    """An argument that the help page explains."""
+
+    section = "Arguments"
+
+    def __init__(self, *args: Any, tells: str, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self.tells = tells
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str]:
+        """Return the line of the help page."""
+        return self.make_metavar(ctx), self.tells
+
+
+class Command(click.Command):
+    """A command whose help lists its options by sections and ends with examples."""
+
+    def __init__(self, *args: Any, examples: tuple[str, ...] = (), **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self.examples = examples
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, section by section."""
+        sections: dict[str, list[tuple[str, str]]] = {}
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx)
+            if record is not None:
+                sections.setdefault(getattr(parameter, "section", "Other"), []).append(record)
+        for title, records in sorted(sections.items(), key=lambda item: SECTIONS.index(item[0])):
+            with formatter.section(title):
+                formatter.write_dl(records)
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's
+        """Write the examples, each on a line that can be copied."""
+        if self.examples:
+            formatter.write("\nExamples:\n" + "".join(f"  $ {example}\n" for example in self.examples))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """Which model, and what is wanted of it.
+
+    Parameters
+    ----------
+    source : str
+    properties : tuple of str
+        As often as ``--property`` was given.
+    constants, start, lexicon : str, optional
+    """
+
+    source: str
+    properties: tuple[str, ...] = ()
+    constants: str | None = None
+    start: str | None = None
+    lexicon: str | None = None
+
+
+def option(*names: str, section: str, **settings: Any) -> Callable[[F], F]:
+    """Decorate a command with one option in a section of its help page."""
+    return click.option(*names, cls=Option, section=section, **settings)
+
+
+def argument(name: str, *, tells: str, **settings: Any) -> Callable[[F], F]:
+    """Decorate a command with one argument."""
+    return click.argument(name, cls=Argument, tells=tells, **settings)
+
+
+_SOURCE: Mapping[str, Callable[[F], F]] = {
+    "properties": option(
+        "-p",
+        "--property",
+        "properties",
+        section="Source",
+        metavar="TEXT",
+        multiple=True,
+        show_default=False,
+        help="What is wanted, in PRISM's syntax or by the name it has in the source.  [default: the source's own, or the "
+        "least of its one reward until goal, target or destination]",
+    ),
+    "constants": option(
+        "--constants", section="Source", metavar="N=5,K=2", help="Values for constants of a PRISM or JANI model."
+    ),
+    "start": option(
+        "--start",
+        section="Source",
+        metavar="STATE",
+        help="The state to begin in, a number from 0 or an exact name.  [default: the initial state]",
+    ),
+    "lexicon": option(
+        "--lexicon",
+        section="Output",
+        metavar="FILE.toml",
+        help="Words for actions, states and the objective, in place of the model's.",
+    ),
+}
+
+
+def source_options(*keys: str) -> Callable[[F], Callable[..., Any]]:
+    """Decorate a command with SOURCE and some of its options; they arrive as one `Wanted`, the first argument."""
+
+    def decorate(command: F) -> Callable[..., Any]:
+        @functools.wraps(command)
+        def gathered(**given: Any) -> Any:
+            wanted = Wanted(source=given.pop("source"), **{key: given.pop(key) for key in keys})
+            return command(wanted, **given)
+
+        decorated: Callable[..., Any] = gathered
+        for key in reversed(keys):
+            decorated = _SOURCE[key](decorated)
+        return argument("source", tells="An example such as example:paper-5x5, or a model's file.")(decorated)
+
+    return decorate
+
+
+def output_options(*formats: str) -> Callable[[F], F]:
+    """Decorate a command with ``--format`` (the first is the default) and ``--output``."""
+
+    def decorate(command: F) -> F:
+        command = option(
+            "-o", "--output", section="Output", metavar="FILE", help="Write the answer to a file, whole or not at all."
+        )(command)
+        return option(
+            "--format",
+            "form",
+            section="Output",
+            type=click.Choice(formats),
+            help=f"How the answer is written.  [default: {formats[0]}, or what the suffix of --output says]",
+        )(command)
+
+    return decorate

@@ -1,0 +1,296 @@
+"""A Solution and a start enter; what a person sees leaves: the most probable path to a goal under the policy, and its chance.
+
+Definition
+----------
+Branches that stay in place are removed and the rest renormalised (a stuck robot is not a turn). Among all paths from the
+start to a goal, the most probable one is taken; ties within 1e-12 in log-probability go to the lexicographically first
+sequence of (choice, branch). Without a goal in the objective: the most probable branch until a state repeats, at most
+1,000 steps. A policy that never arrives is an answer too: the route then ends where it goes round for ever, in a set of
+states that the policy cannot leave.
+
+Method: Dijkstra's algorithm backwards from the goals with lengths -log p, then one walk forwards. A branch that keeps the
+length within the tie must come nearer to the goal, or be the only one, so that the walk ends.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from ratherthan.model.mdp import Bools, Floats
+from ratherthan.model.objective import ReachAvoid
+from ratherthan.solve.solution import Solution
+
+__all__ = ["PolicyGraph", "Route", "policy_graph", "reachable_at_all", "route_from"]
+
+TIE = 1e-12
+MOST_STEPS = 1000
+SMALL = 20_000
+
+Array = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Route:
+    """A path: its states, the choice taken at each but the last, its outcome and its probability.
+
+    `outcome`, `circle` and `certain` are as in `ratherthan.explain.explanation.Explanation`.
+    """
+
+    states: tuple[int, ...]
+    choices: tuple[int, ...]
+    outcome: str
+    probability: float
+    circle: tuple[int, ...] = ()
+    certain: bool = True
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PolicyGraph:
+    """The branches that a policy follows, in rows by state and in the order of (choice, branch): E edges.
+
+    `probability` is renormalised after staying in place has been removed; states where the objective has ended, and
+    states that only stay in place, have no edges.
+    """
+
+    first: Array  # [S+1]
+    target: Array  # [E]
+    choice: Array  # [E]
+    probability: Floats  # [E]
+
+    @property
+    def states(self) -> int:
+        """The number of states, S."""
+        return len(self.first) - 1
+
+    def edges_of(self, state: int) -> range:
+        """Return the edges of one state."""
+        return range(int(self.first[state]), int(self.first[state + 1]))
+
+    @cached_property
+    def origin(self) -> Array:
+        """The state of each edge, ``[E]``."""
+        return np.repeat(np.arange(self.states), np.diff(self.first))
+
+    def reachable(self, start: int) -> Bools:
+        """Return which states can be reached from `start`, itself included."""
+        seen = np.zeros(self.states, dtype=bool)
+        seen[start] = True
+        frontier = np.array([start])
+        while len(frontier):
+            counts = self.first[frontier + 1] - self.first[frontier]
+            skip = np.repeat(self.first[frontier] - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
+            target = self.target[skip + np.arange(int(counts.sum()))]
+            frontier = np.unique(target[~seen[target]])
+            seen[frontier] = True
+        return seen
+
+
+def policy_graph(solution: Solution) -> PolicyGraph:
+    """Return the graph that the solution's policy follows."""
+    mdp = solution.problem.mdp
+    taken = solution.policy.weights(mdp)
+    state_of_choice = np.repeat(np.arange(mdp.states), np.diff(mdp.state_to_choices))
+    taken = np.where(solution.ended[state_of_choice], 0.0, taken)
+    chosen = np.flatnonzero(taken > 0)
+    begin = mdp.choice_to_branches[chosen].astype(np.int64)
+    counts = mdp.choice_to_branches[chosen + 1] - begin
+    total = int(counts.sum())
+    skip = np.repeat(begin - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts) if total else np.zeros(0, np.int64)
+    branch = skip + np.arange(total)
+    choice = np.repeat(chosen, counts)
+    origin, target = state_of_choice[choice], mdp.branch_to_target[branch].astype(np.int64)
+    moves = origin != target
+    origin, target, choice = origin[moves], target[moves], choice[moves]
+    weight = taken[choice] * mdp.branch_to_probability[branch[moves]]
+    sums = np.bincount(origin, weights=weight, minlength=mdp.states)
+    first = np.concatenate([[0], np.cumsum(np.bincount(origin, minlength=mdp.states))])
+    return PolicyGraph(first=first, target=target, choice=choice, probability=weight / sums[origin])
+
+
+def route_from(solution: Solution, graph: PolicyGraph, start: int) -> Route:
+    """Find the route from `start`.
+
+    Parameters
+    ----------
+    solution : Solution
+    graph : PolicyGraph
+        Of the solution's policy.
+    start : int
+
+    Returns
+    -------
+    Route
+    """
+    if solution.ended[start]:
+        return Route(states=(start,), choices=(), outcome=_end_of(solution, start), probability=1.0)
+    if _is_risk(solution):
+        return _without_goal(graph, start)
+    if not solution.can_arrive[start]:
+        reached = np.flatnonzero(reachable_at_all(solution, start))
+        return Route(states=(start,), choices=(), outcome="no way", probability=1.0, circle=tuple(map(int, reached)))
+    reachable = graph.reachable(start)
+    if (reachable & solution.goal).any():
+        states, choices, probability = _most_probable(graph, start, solution.goal, reachable)
+        return Route(states=states, choices=choices, outcome="arrives", probability=probability)
+    return _circling(graph, start, reachable)
+
+
+def _is_risk(solution: Solution) -> bool:
+    """Whether the objective is a probability to be kept small: it has no goal to arrive at."""
+    objective = solution.objectives[0]
+    return isinstance(objective, ReachAvoid) and not objective.maximise
+
+
+def _end_of(solution: Solution, state: int) -> str:
+    return "there" if solution.goal[state] and not _is_risk(solution) else "ended"
+
+
+def reachable_at_all(solution: Solution, start: int) -> Bools:
+    """Return what any policy can reach from `start`; states where the objective has ended are leaves."""
+    from ratherthan.factors import search_tree
+
+    seen = np.zeros(solution.problem.mdp.states, dtype=bool)
+    seen[start] = True
+    for choice in () if solution.ended[start] else solution.problem.mdp.choices_of(start):
+        seen[search_tree(solution.problem.mdp, solution.ended, choice)] = True
+    return seen
+
+
+def _without_goal(graph: PolicyGraph, start: int) -> Route:
+    """Follow the most probable branch until a state repeats or the objective has ended."""
+    states, probability = [start], 1.0
+    choices: list[int] = []
+    seen = {start}
+    while len(choices) < MOST_STEPS:
+        edges = graph.edges_of(states[-1])
+        if not edges:
+            break
+        best = max(float(graph.probability[e]) for e in edges)
+        edge = next(e for e in edges if graph.probability[e] >= best * (1 - TIE))
+        states.append(int(graph.target[edge]))
+        choices.append(int(graph.choice[edge]))
+        probability *= float(graph.probability[edge])
+        if states[-1] in seen:
+            break
+        seen.add(states[-1])
+    return Route(states=tuple(states), choices=tuple(choices), outcome="open end", probability=probability)
+
+
+def _circling(graph: PolicyGraph, start: int, reachable: Bools) -> Route:
+    """Return the most probable way into a set of states that the policy cannot leave, once round it, and that set."""
+    component, closed = _closed_components(graph, reachable)
+    states, choices, probability = _most_probable(graph, start, closed, reachable)
+    circle = np.flatnonzero(component == component[states[-1]])
+    round_states, round_choices = _once_round(graph, states[-1])
+    return Route(
+        states=states + round_states[1:],
+        choices=choices + round_choices,
+        outcome="circles",
+        probability=probability,
+        circle=tuple(map(int, circle)),
+        certain=bool((component[closed] == component[states[-1]]).all()),
+    )
+
+
+def _closed_components(graph: PolicyGraph, reachable: Bools) -> tuple[Array, Bools]:
+    """Return the strongly connected component of each reachable state (-1 elsewhere), and which lie in a closed one."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    inside = reachable[graph.origin]
+    matrix = csr_array(
+        (np.ones(int(inside.sum())), (graph.origin[inside], graph.target[inside])), shape=(graph.states, graph.states)
+    )
+    _, component = connected_components(matrix, directed=True, connection="strong")
+    component[~reachable] = -1
+    leaving = inside & (component[graph.origin] != component[graph.target])
+    closed = reachable & ~np.isin(component, component[graph.origin[leaving]])
+    return np.asarray(component, dtype=np.int64), closed
+
+
+def _once_round(graph: PolicyGraph, start: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Follow the most probable branch from `start` until a state repeats."""
+    states = [start]
+    choices: list[int] = []
+    while states[-1] not in states[:-1] and len(choices) < MOST_STEPS:
+        edges = graph.edges_of(states[-1])
+        if not edges:
+            break
+        edge = max(edges, key=lambda e: (float(graph.probability[e]), -e))
+        states.append(int(graph.target[edge]))
+        choices.append(int(graph.choice[edge]))
+    return tuple(states), tuple(choices)
+
+
+def _most_probable(
+    graph: PolicyGraph, start: int, goals: Bools, reachable: Bools
+) -> tuple[tuple[int, ...], tuple[int, ...], float]:
+    """Return states, choices and probability of the most probable path from `start` to one of `goals`."""
+    length = -np.log(np.minimum(graph.probability, 1.0))
+    distance = _distances(graph, length, goals, reachable)
+    states, choices, total = [start], [], 0.0
+    while not goals[states[-1]]:
+        here = states[-1]
+        edges = graph.edges_of(here)
+        edge = next(
+            e
+            for e in edges
+            if length[e] + distance[graph.target[e]] <= distance[here] + TIE
+            and (distance[graph.target[e]] < distance[here] or len(edges) == 1)
+        )
+        states.append(int(graph.target[edge]))
+        choices.append(int(graph.choice[edge]))
+        total += float(length[edge])
+    return tuple(states), tuple(choices), math.exp(-total)
+
+
+def _distances(graph: PolicyGraph, length: Floats, goals: Bools, reachable: Bools) -> Floats:
+    """Return the least total length from each reachable state to one of `goals`, ``[S]``."""
+    inside = np.flatnonzero(reachable[graph.origin] & ~goals[graph.origin])
+    order = inside[np.argsort(graph.target[inside], kind="stable")]
+    into = np.searchsorted(graph.target[order], np.arange(graph.states + 1))
+    if len(inside) > SMALL:
+        return _distances_compiled(graph, length, goals & reachable, inside)
+    distance = np.full(graph.states, np.inf)
+    sources = np.flatnonzero(goals & reachable)
+    distance[sources] = 0.0
+    queue = [(0.0, int(s)) for s in sources]
+    done = np.zeros(graph.states, dtype=bool)
+    while queue:
+        so_far, state = heapq.heappop(queue)
+        if done[state]:
+            continue
+        done[state] = True
+        for edge in order[into[state] : into[state + 1]]:
+            origin, candidate = int(graph.origin[edge]), so_far + float(length[edge])
+            if candidate < distance[origin]:
+                distance[origin] = candidate
+                heapq.heappush(queue, (candidate, origin))
+    return distance
+
+
+def _distances_compiled(graph: PolicyGraph, length: Floats, goals: Bools, inside: Array) -> Floats:
+    """Do the same with scipy's compiled algorithm, for large models.
+
+    A length of exactly 0 would vanish from a sparse matrix, and of parallel edges the matrix keeps the sum: so lengths are
+    taken up by the smallest number that cannot matter, and only the shortest of parallel edges is kept.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+
+    origin, target = graph.origin[inside], graph.target[inside]
+    lengths = np.maximum(length[inside], 1e-300)
+    order = np.lexsort((lengths, origin, target))
+    origin, target, lengths = origin[order], target[order], lengths[order]
+    keep = np.ones(len(order), dtype=bool)
+    keep[1:] = (origin[1:] != origin[:-1]) | (target[1:] != target[:-1])
+    backwards = csr_array((lengths[keep], (target[keep], origin[keep])), shape=(graph.states, graph.states))
+    sources = np.flatnonzero(goals)
+    distance: Floats = dijkstra(backwards, directed=True, indices=sources, min_only=True)
+    return distance

@@ -1,0 +1,341 @@
+"""What a Problem holds beside its MDP enters and leaves as small files of our own, which lie in a folder ``ratherthan/``.
+
+Formats that exchange models have no place for a map, an objective or words. They are kept beside the model, where other
+tools pass over them:
+
+========================== ============================================================================================
+``problem.json``           ``version`` (1), ``names`` (true where states have names), ``texts`` (of those below),
+                           ``labels`` (of those below), ``world`` (``width``, ``height``, ``kinds``, ``zones``, ``note``,
+                           ``title``), ``objective``, ``properties``, ``definitions``, ``lexicon``, ``notes``; each absent
+                           where there is none
+``names-offsets.bin``      where each state's name begins in ``names.bin`` and the last ends, uint64
+``names.bin``              the names of the states in UTF-8
+``text-0-offsets.bin`` …,  likewise what the numbers 0, 1, 2 … of each state variable in ``texts`` stand for
+``text-0.bin`` …
+``cell-of-state.bin``      the cell of each state, int32, -1 where it has none
+``kind-of-cell.bin``       the kind of ground of each cell, uint8, an index into ``kinds``
+``zone-0.bin`` …           the cells of each zone, a bit each, in the order of ``zones``
+``label-0.bin`` …          the states of each label in ``labels``, a bit each
+========================== ============================================================================================
+
+An objective is ``{"kind": "expected-cost", "goal", "reward", "maximise"}`` or ``{"kind": "reach-avoid", "goal", "through",
+"maximise"}``; a threshold is ``{"kind": "threshold", "objective", "relation", "bound"}``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, NoReturn
+
+import numpy as np
+import numpy.typing as npt
+
+from ratherthan.errors import SourceError
+from ratherthan.io._strings import PackedStrings, pack_strings
+from ratherthan.model.lexicon import Lexicon
+from ratherthan.model.mdp import MDP, Bools
+from ratherthan.model.objective import ExpectedCost, Objective, ReachAvoid, Threshold
+from ratherthan.model.problem import Problem
+from ratherthan.model.world import World
+
+__all__ = ["Extras", "packed_extras", "problem_of"]
+
+Bytes = npt.NDArray[np.uint8]
+VERSION = 1
+MAIN = "problem.json"
+RELATIONS = (">=", ">", "<=", "<")
+
+
+def packed_extras(
+    problem: Problem,
+    *,
+    names: Sequence[str] | None = None,
+    texts: Mapping[str, Sequence[str]] | None = None,
+    labels: Mapping[str, Bools] | None = None,
+) -> dict[str, bytes]:
+    """Return what `problem` holds beside its MDP as files by name, none where there is nothing.
+
+    Parameters
+    ----------
+    problem : Problem
+    names : sequence of str, ``[S]``, optional
+        The names of the states, where the format itself cannot hold them.
+    texts : mapping of str to sequence of str, optional
+        What the numbers of a state variable stand for, where the format itself cannot hold text.
+    labels : mapping of str to array of bool, ``[S]``, optional
+        Labels that the format itself cannot hold.
+    """
+    table: dict[str, Any] = {}
+    files: dict[str, bytes] = {}
+    if names is not None:
+        table["names"] = True
+        files |= _string_files("names", names)
+    if texts:
+        table["texts"] = list(texts)
+        files |= {
+            name: data
+            for i, text in enumerate(texts.values())
+            for name, data in _string_files(f"text-{i}", text).items()
+        }
+    if labels:
+        table["labels"] = list(labels)
+        files |= {f"label-{i}.bin": _bits(mask) for i, mask in enumerate(labels.values())}
+    if problem.world is not None:
+        table["world"], more = _world_files(problem.world)
+        files |= more
+    if problem.objective is not None:
+        table["objective"] = _spelled(problem.objective)
+    if problem.properties:
+        table["properties"] = {name: _spelled(item) for name, item in problem.properties.items()}
+    if problem.definitions:
+        table["definitions"] = dict(problem.definitions)
+    if problem.lexicon != Lexicon():
+        table["lexicon"] = asdict(problem.lexicon)
+    if problem.notes:
+        table["notes"] = list(problem.notes)
+    if not table:
+        return {}
+    text = json.dumps({"version": VERSION} | table, indent=1)
+    return {MAIN: text.encode("ascii")} | files
+
+
+def _bits(mask: Bools) -> bytes:
+    return np.packbits(mask, bitorder="little").tobytes()
+
+
+def _string_files(stem: str, strings: Sequence[str]) -> dict[str, bytes]:
+    offsets, block = pack_strings(strings)
+    return {f"{stem}-offsets.bin": offsets.tobytes(), f"{stem}.bin": block.tobytes()}
+
+
+def _world_files(world: World) -> tuple[dict[str, Any], dict[str, bytes]]:
+    table = {
+        "width": world.width,
+        "height": world.height,
+        "kinds": list(world.kinds),
+        "zones": list(world.zones),
+        "note": world.note,
+        "title": world.title,
+    }
+    files = {
+        "cell-of-state.bin": world.cell_of_state.astype("<i4").tobytes(),
+        "kind-of-cell.bin": world.kind_of_cell.astype(np.uint8).tobytes(),
+    }
+    return table, files | {f"zone-{i}.bin": _bits(mask) for i, mask in enumerate(world.zones.values())}
+
+
+def _spelled(item: Objective | Threshold) -> dict[str, Any]:
+    if isinstance(item, Threshold):
+        return {
+            "kind": "threshold",
+            "objective": _spelled(item.objective),
+            "relation": item.relation,
+            "bound": item.bound,
+        }
+    return {"kind": "expected-cost" if isinstance(item, ExpectedCost) else "reach-avoid"} | asdict(item)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extras:
+    """What lay beside a model in a file of ours: the contents of ``problem.json``, and the other files by name."""
+
+    table: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, Bytes] = field(default_factory=dict)
+    shown: str = ""
+    notes: tuple[str, ...] = ()
+
+    @staticmethod
+    def unpacked(files: Mapping[str, Bytes], shown: str) -> Extras:
+        """Return what the files hold; nothing of another version is read, which a note says.
+
+        Parameters
+        ----------
+        files : mapping of str to array of uint8
+            The files of the folder by name.
+        shown : str
+            How the source is called in errors.
+
+        Raises
+        ------
+        SourceError
+            Where ``problem.json`` is no JSON object.
+        """
+        if MAIN not in files:
+            return Extras(shown=shown)
+        try:
+            table = json.loads(files[MAIN].tobytes().decode("utf-8"))
+        except (ValueError, RecursionError) as error:
+            raise SourceError(
+                f"problem.json of '{shown}' must be JSON, but is not: {error}. Write the file anew.", path=shown
+            ) from error
+        extras = Extras(table=table, files=files, shown=shown)
+        if not isinstance(table, dict):
+            extras.fail("an object", table)
+        if table.get("version") != VERSION:
+            note = f"Its map, objective and words are of version {table.get('version')!r} and were not read."
+            return Extras(shown=shown, notes=(note,))
+        return extras
+
+    def fail(self, must: str, came: object) -> NoReturn:
+        """Raise SourceError: ``problem.json`` must have `must`."""
+        shown = repr(came)
+        shown = shown if len(shown) <= 80 else shown[:77] + "…"
+        raise SourceError(
+            f"problem.json of '{self.shown}' must have {must}, got {shown}. Write the file anew.", path=self.shown
+        )
+
+    def names(self, states: int) -> PackedStrings | None:
+        """Return the names of the states, None where there are none."""
+        if not self.table.get("names"):
+            return None
+        names = self._strings("names")
+        if len(names) != states:
+            self.fail(f"{states} names of states beside it", len(names))
+        return names
+
+    def texts(self) -> dict[str, PackedStrings]:
+        """Return what the numbers of state variables stand for, by the variable."""
+        variables = self._texts(self.table.get("texts", []), "a list of strings at 'texts'")
+        return {name: self._strings(f"text-{i}") for i, name in enumerate(variables)}
+
+    def all_labels(self, labels: Mapping[str, Bools], states: int) -> dict[str, Bools]:
+        """Return `labels` and those that lie beside the model."""
+        own = self._texts(self.table.get("labels", []), "a list of strings at 'labels'")
+        return dict(labels) | {name: self._mask(f"label-{i}.bin", states) for i, name in enumerate(own)}
+
+    def world(self, states: int) -> World | None:
+        """Return the map, None where there is none."""
+        table = self.table.get("world")
+        if table is None:
+            return None
+        table = self._object(table, "world")
+        width, height = (self._whole(table.get(key), key) for key in ("width", "height"))
+        kinds = tuple(self._texts(table.get("kinds"), "a list of strings at 'kinds'"))
+        kind_of_cell = self._file("kind-of-cell.bin", width * height).copy()
+        if len(kind_of_cell) and kind_of_cell.max() >= len(kinds):
+            self.fail(f"kinds of cells below {len(kinds)}", int(kind_of_cell.max()))
+        cell_of_state = self._file("cell-of-state.bin", 4 * states).view("<i4").astype(np.int32)
+        if ((cell_of_state < -1) | (cell_of_state >= width * height)).any():
+            self.fail(f"cells of states in -1 … {width * height - 1}", "others")
+        zones = self._texts(table.get("zones", []), "a list of strings at 'zones'")
+        return World(
+            width=width,
+            height=height,
+            kinds=kinds,
+            kind_of_cell=kind_of_cell,
+            cell_of_state=cell_of_state,
+            zones={name: self._mask(f"zone-{i}.bin", width * height) for i, name in enumerate(zones)},
+            note=self._text(table.get("note", ""), "note"),
+            title=self._text(table.get("title", ""), "title"),
+        )
+
+    def objective(self, value: Any) -> Objective:
+        """Return an objective out of its JSON."""
+        table = self._object(value, "objective")
+        goal = self._text(table.get("goal"), "goal")
+        maximise = table.get("maximise")
+        if not isinstance(maximise, bool):
+            self.fail("true or false at 'maximise'", maximise)
+        if table.get("kind") == "expected-cost":
+            return ExpectedCost(goal=goal, reward=self._maybe_text(table.get("reward"), "reward"), maximise=maximise)
+        if table.get("kind") == "reach-avoid":
+            return ReachAvoid(goal=goal, through=self._maybe_text(table.get("through"), "through"), maximise=maximise)
+        self.fail("'expected-cost' or 'reach-avoid' as the kind of an objective", table.get("kind"))
+
+    def property(self, value: Any) -> Objective | Threshold:
+        """Return an objective or a threshold out of its JSON."""
+        table = self._object(value, "properties")
+        if table.get("kind") != "threshold":
+            return self.objective(table)
+        relation, bound = table.get("relation"), table.get("bound")
+        if relation not in RELATIONS:
+            self.fail(f"one of {', '.join(RELATIONS)} at 'relation'", relation)
+        if isinstance(bound, bool) or not isinstance(bound, int | float) or bound != bound:
+            self.fail("a number at 'bound'", bound)
+        return Threshold(objective=self.objective(table.get("objective")), relation=relation, bound=float(bound))
+
+    def lexicon(self) -> Lexicon:
+        """Return the words, the default where there are none."""
+        if "lexicon" not in self.table:
+            return Lexicon()
+        table = self._object(self.table["lexicon"], "lexicon")
+        words: Callable[[Any, str], dict[str, str]] = self._words
+        return Lexicon(
+            language=self._text(table.get("language", "en"), "language"),
+            actions=words(table.get("actions", {}), "actions"),
+            gerunds=words(table.get("gerunds", {}), "gerunds"),
+            state=self._text(table.get("state", ""), "state"),
+            states=words(table.get("states", {}), "states"),
+            objectives={k: words(v, k) for k, v in self._object(table.get("objectives", {}), "objectives").items()},
+        )
+
+    def stored_notes(self) -> tuple[str, ...]:
+        """Return the notes that were written with the model, and those made here."""
+        return (*self._texts(self.table.get("notes", []), "a list of strings at 'notes'"), *self.notes)
+
+    def words(self, key: str) -> dict[str, str]:
+        """Return a table of strings, empty where it is absent."""
+        return self._words(self.table.get(key, {}), key)
+
+    def properties(self) -> dict[str, Objective | Threshold]:
+        """Return the properties by name."""
+        table = self._object(self.table.get("properties", {}), "properties")
+        return {name: self.property(value) for name, value in table.items()}
+
+    def _object(self, value: Any, key: str) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            self.fail(f"an object at '{key}'", value)
+        return value
+
+    def _text(self, value: Any, key: str) -> str:
+        if not isinstance(value, str):
+            self.fail(f"a string at '{key}'", value)
+        return value
+
+    def _maybe_text(self, value: Any, key: str) -> str | None:
+        return None if value is None else self._text(value, key)
+
+    def _whole(self, value: Any, key: str) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**31:
+            self.fail(f"a whole number at '{key}'", value)
+        return value
+
+    def _texts(self, value: Any, must: str) -> list[str]:
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            self.fail(must, value)
+        return value
+
+    def _words(self, value: Any, key: str) -> dict[str, str]:
+        table = self._object(value, key)
+        return {name: self._text(item, f"{key}.{name}") for name, item in table.items()}
+
+    def _file(self, name: str, size: int) -> Bytes:
+        data = self.files.get(name)
+        if data is None or len(data) != size:
+            self.fail(f"a file '{name}' of {size} bytes beside it", "none" if data is None else f"{len(data)} bytes")
+        return data
+
+    def _strings(self, stem: str) -> PackedStrings:
+        offsets, block = self.files.get(f"{stem}-offsets.bin"), self.files.get(f"{stem}.bin")
+        if offsets is None or block is None or len(offsets) % 8:
+            self.fail(f"the files '{stem}-offsets.bin', in words of 8 bytes, and '{stem}.bin' beside it", "none")
+        return PackedStrings(offsets.view("<u8"), block, f"{stem}.bin in '{self.shown}'")
+
+    def _mask(self, name: str, count: int) -> Bools:
+        return np.unpackbits(self._file(name, -(-count // 8)), count=count, bitorder="little").astype(bool)
+
+
+def problem_of(mdp: MDP, extras: Extras, *, source: str, notes: tuple[str, ...]) -> Problem:
+    """Return a model with all that lay beside it."""
+    return Problem(
+        mdp=mdp,
+        world=extras.world(mdp.states),
+        objective=None if extras.table.get("objective") is None else extras.objective(extras.table["objective"]),
+        properties=extras.properties(),
+        definitions=extras.words("definitions"),
+        lexicon=extras.lexicon(),
+        source=source,
+        notes=extras.stored_notes() + notes,
+    )

@@ -1,0 +1,238 @@
+"""A file, a name or an object enters, a Problem leaves; and a Problem enters, a file leaves.
+
+One table says which adapter reads what. A file is told by its suffix; with another suffix, or none, by its first bytes.
+Adapters are loaded when they are needed.
+
+============== ==================================================== ===========================
+source         told by                                              read by
+============== ==================================================== ===========================
+example        ``example:NAME``                                     `ratherthan.io.examples`
+road map       ``.roadmap``; ``map = '''`` at the start of a line   `ratherthan.io.roadmap`
+UMB            ``.umb``; a tar archive, gzip or xz                  `ratherthan.io.umb`
+NumPy archive  ``.npz``; a zip archive                              `ratherthan.io.arrays`
+PRISM          ``.prism .nm .pm .sm``; ``mdp`` or ``dtmc``          `ratherthan.io.prism`
+JANI           ``.jani``; ``"jani-version"`` in a JSON object       `ratherthan.io.jani`
+object         a Problem or MDP as it is; arrays                    `ratherthan.io.arrays`
+============== ==================================================== ===========================
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ratherthan.errors import PropertyError, SourceError
+from ratherthan.io._files import open_source
+from ratherthan.io._tar import is_tar
+from ratherthan.io._unpacking import packing_of
+from ratherthan.model.mdp import MDP
+from ratherthan.model.objective import Threshold
+from ratherthan.model.problem import Problem
+from ratherthan.model.states import start_of, state_number
+
+__all__ = ["read", "start_of", "state_number", "write"]
+
+HEAD = 1 << 16
+"""How many bytes are looked at to tell what a file is."""
+
+COMMENTS = re.compile(rb"//[^\n]*|/\*.*?\*/", re.DOTALL)
+PRISM_WORD = re.compile(
+    rb"^\s*(mdp|dtmc|nondeterministic|probabilistic|ctmc|stochastic|pta|pomdp|smg|module)\s", re.MULTILINE
+)
+ROADMAP_LINE = re.compile(rb"^map\s*=\s*('''|\"\"\"|'|\")", re.MULTILINE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Adapter:
+    """What reads one kind of file: its function, its suffixes, and whether it is text with constants to be set."""
+
+    kind: str
+    module: str
+    function: str
+    suffixes: tuple[str, ...]
+    constants: bool = False
+    text: bool = False
+
+    def load(self) -> Callable[..., Problem]:
+        """Return the function."""
+        loaded: Callable[..., Problem] = getattr(importlib.import_module(f"ratherthan.io.{self.module}"), self.function)
+        return loaded
+
+
+EXAMPLE = Adapter(kind="an example", module="examples", function="read_example", suffixes=())
+ROADMAP = Adapter(kind="a road map", module="roadmap", function="read_roadmap", suffixes=(".roadmap",), text=True)
+UMB = Adapter(kind="a UMB archive", module="umb", function="read_umb", suffixes=(".umb",))
+NPZ = Adapter(kind="a NumPy archive", module="npz", function="read_npz", suffixes=(".npz",))
+PRISM = Adapter(
+    kind="a PRISM model",
+    module="prism",
+    function="read_prism",
+    suffixes=(".prism", ".nm", ".pm", ".sm"),
+    constants=True,
+    text=True,
+)
+JANI = Adapter(kind="a JANI model", module="jani", function="read_jani", suffixes=(".jani",), constants=True, text=True)
+ADAPTERS = (ROADMAP, UMB, NPZ, PRISM, JANI)
+PREFIX = "example:"
+
+WRITERS = {".umb": ("umb", "write_umb"), ".npz": ("npz", "write_npz"), ".roadmap": ("roadmap", "write_roadmap")}
+
+
+def read(
+    source: Any,
+    *,
+    constants: str | Mapping[str, Any] | None = None,
+    objective: str | None = None,
+    start: str | int | None = None,
+    **options: Any,
+) -> Problem:
+    """Read a model.
+
+    Parameters
+    ----------
+    source : str, path, Problem, MDP or arrays
+        ``example:NAME``, a file, a model as it is, or transitions as `from_arrays` takes them.
+    constants : str or mapping, optional
+        Values for the constants of a PRISM or JANI model, ``"N=5,K=2"`` or ``{"N": 5, "K": 2}``.
+    objective : str, optional
+        What is wanted: a property in PRISM's syntax, or the name of one that comes with the source.
+    start : int or str, optional
+        The state to start from, a number or an exact name, in place of the model's initial states.
+    **options
+        Handed to the adapter: `limits` of archives, `rewards`, `labels` … of arrays.
+
+    Returns
+    -------
+    Problem
+
+    Raises
+    ------
+    SourceError
+        Where the source is missing, empty, damaged or of a kind that cannot be read, or has no constants to set.
+    ModelError
+        Where the model in it breaks a law.
+    PropertyError
+        Where the objective cannot be read.
+    QuestionError
+        Where there is no such state to start from.
+    """
+    problem = _read(source, constants or None, options)
+    if objective is not None:
+        from ratherthan.model.property import choose_objective
+
+        chosen = choose_objective(problem, objective)
+        if isinstance(chosen, Threshold):
+            raise PropertyError(
+                f"An objective must ask for a best value (=?), got the yes-or-no question '{chosen.text}'. "
+                f"Ask for '{chosen.objective.text}'.",
+                text=objective,
+            )
+        problem = replace(problem, objective=chosen)
+    if start is not None:
+        import numpy as np
+
+        mdp = replace(problem.mdp, initial=np.array([state_number(problem.mdp, start)]))
+        problem = replace(problem, mdp=mdp)
+    return problem
+
+
+def _read(source: Any, constants: str | Mapping[str, Any] | None, options: dict[str, Any]) -> Problem:
+    """Read a source of any kind, without what was asked of it."""
+    if isinstance(source, str) and source.startswith(PREFIX):
+        _refuse_constants(constants, EXAMPLE, source)
+        return EXAMPLE.load()(source.removeprefix(PREFIX), **options)
+    if isinstance(source, str | os.PathLike):
+        adapter = _adapter_of(source)
+        if adapter.constants:
+            return adapter.load()(source, constants=constants, **options)
+        _refuse_constants(constants, adapter, os.fspath(source))
+        return adapter.load()(source, **options)
+    if constants is not None:
+        raise SourceError("Only PRISM and JANI models have constants to set, got an object. Leave the constants out.")
+    if isinstance(source, Problem | MDP):
+        if options:
+            raise SourceError(
+                f"A model that is read already takes no options, got {', '.join(options)}. Leave them out."
+            )
+        return source if isinstance(source, Problem) else Problem(mdp=source, source="an MDP")
+    from ratherthan.io.arrays import from_arrays
+
+    return from_arrays(**source, **options) if isinstance(source, Mapping) else from_arrays(source, **options)
+
+
+def _refuse_constants(constants: object, adapter: Adapter, shown: str) -> None:
+    if constants is not None:
+        raise SourceError(
+            f"Only PRISM and JANI models have constants to set, but '{shown}' is {adapter.kind}. Leave the constants out.",
+            path=shown,
+        )
+
+
+def _adapter_of(path: str | os.PathLike[str]) -> Adapter:
+    """Return what reads a file: by its suffix, else by its first bytes."""
+    shown = os.fspath(path)
+    suffix = Path(path).suffix.lower()
+    with open_source(path) as file:
+        head = file.read(HEAD)
+    for adapter in ADAPTERS:
+        if suffix in adapter.suffixes:
+            break
+    else:
+        adapter = _by_content(head, shown)
+    if adapter.text and b"\x00" in head:
+        raise SourceError(
+            f"{adapter.kind.capitalize()} must be text, but '{shown}' is binary. Check what it is.", path=shown
+        )
+    return adapter
+
+
+def _by_content(head: bytes, shown: str) -> Adapter:
+    if is_tar(head) or packing_of(head):
+        return UMB
+    if head.startswith(b"PK\x03\x04"):
+        return NPZ
+    if head.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{") and b'"jani-version"' in head:
+        return JANI
+    if b"\x00" not in head:
+        if ROADMAP_LINE.search(head):
+            return ROADMAP
+        if PRISM_WORD.search(COMMENTS.sub(b" ", head)):
+            return PRISM
+    known = "; ".join(f"{adapter.kind} ({' '.join(adapter.suffixes)})" for adapter in ADAPTERS)
+    raise SourceError(
+        f"A source must be {PREFIX}NAME or one of: {known}; but '{shown}' is none of them, by its name nor by its contents. "
+        "Convert it, or give it the suffix of what it is.",
+        path=shown,
+    )
+
+
+def write(problem: Problem, path: str | os.PathLike[str], **options: Any) -> None:
+    """Write a model to a file, whole or not at all.
+
+    Parameters
+    ----------
+    problem : Problem
+    path : path
+        ``.umb`` for the Unified Markov Binary format, ``.npz`` for a NumPy archive, ``.roadmap`` for a problem that came
+        from a road map.
+    **options
+        Handed to the writer.
+
+    Raises
+    ------
+    SourceError
+        Where the suffix is another, or the file cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in WRITERS:
+        raise SourceError(
+            f"A model is written as {' or '.join(WRITERS)}, got '{os.fspath(path)}'. Give the file one of these suffixes.",
+            path=os.fspath(path),
+        )
+    module, function = WRITERS[suffix]
+    getattr(importlib.import_module(f"ratherthan.io.{module}"), function)(problem, path, **options)

@@ -1,0 +1,137 @@
+"""The rows of a graph enter; their Index leaves: which choice a branch is of, which state a choice is of, what enters a state.
+
+It is built once for a model, in time and memory linear in the branches, and passed on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from ratherthan.model.mdp import MDP, Ints
+
+__all__ = ["Index", "branches_of", "build_index", "index_of"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Index:
+    """The rows of a graph with their reverse: S states, C choices, B branches.
+
+    Parameters
+    ----------
+    state_to_choices, choice_to_branches, branch_to_target : array of int, ``[S+1]``, ``[C+1]``, ``[B]``
+        As in `MDP`.
+    choice_to_state : array of int, ``[C]``
+        The state of each choice.
+    branch_to_choice : array of int, ``[B]``
+        The choice of each branch.
+    entering_from : array of int, ``[S+1]``
+        The choices with a branch to state s are ``entering[entering_from[s]:entering_from[s+1]]``.
+    entering : array of int, ``[B]``
+        Those choices, ascending; a choice with two branches to a state is there twice.
+    """
+
+    state_to_choices: Ints  # [S+1]
+    choice_to_branches: Ints  # [C+1]
+    branch_to_target: Ints  # [B]
+    choice_to_state: Ints  # [C]
+    branch_to_choice: Ints  # [B]
+    entering_from: Ints  # [S+1]
+    entering: Ints  # [B]
+
+    @property
+    def states(self) -> int:
+        """The number of states, S."""
+        return len(self.state_to_choices) - 1
+
+    @property
+    def choices(self) -> int:
+        """The number of choices, C."""
+        return len(self.choice_to_branches) - 1
+
+    @property
+    def work(self) -> int:
+        """How much work one pass is: the number of branches."""
+        return len(self.branch_to_target)
+
+
+_KNOWN: WeakKeyDictionary[MDP, Index] = WeakKeyDictionary()
+
+
+def index_of(mdp: MDP) -> Index:
+    """Return the Index of a model, built the first time it is asked for."""
+    known = _KNOWN.get(mdp)
+    if known is None:
+        known = build_index(mdp.state_to_choices, mdp.choice_to_branches, mdp.branch_to_target)
+        _KNOWN[mdp] = known
+    return known
+
+
+def build_index(state_to_choices: Ints, choice_to_branches: Ints, branch_to_target: Ints) -> Index:
+    """Return the Index of rows.
+
+    Parameters
+    ----------
+    state_to_choices, choice_to_branches, branch_to_target : array of int, ``[S+1]``, ``[C+1]``, ``[B]``
+        As in `MDP`; here a state may be without choices and a choice without branches.
+
+    Returns
+    -------
+    Index
+        Its arrays are read-only.
+    """
+    states = len(state_to_choices) - 1
+    width = _width(states, len(choice_to_branches) - 1, len(branch_to_target))
+    choice_to_state = np.repeat(np.arange(states, dtype=width), np.diff(state_to_choices))
+    branch_to_choice = np.repeat(np.arange(len(choice_to_branches) - 1, dtype=width), np.diff(choice_to_branches))
+    entering_from = np.zeros(states + 1, dtype=np.int64)
+    np.cumsum(np.bincount(branch_to_target, minlength=states), out=entering_from[1:])
+    entering = branch_to_choice[np.argsort(branch_to_target, kind="stable")]
+    return Index(
+        state_to_choices=_locked(state_to_choices, width),
+        choice_to_branches=_locked(choice_to_branches, width),
+        branch_to_target=_locked(branch_to_target, width),
+        choice_to_state=_locked(choice_to_state, width),
+        branch_to_choice=_locked(branch_to_choice, width),
+        entering_from=_locked(entering_from, width),
+        entering=_locked(entering, width),
+    )
+
+
+def _width(*counts: int) -> type[np.int32 | np.int64]:
+    """Return the width of all arrays of an index: with one width, one compiled kernel serves all graphs."""
+    return np.int32 if max(counts) < np.iinfo(np.int32).max else np.int64
+
+
+def _locked(array: npt.NDArray[Any], width: type[np.int32 | np.int64]) -> Ints:
+    """Return `array` in `width`, read-only."""
+    made: Any = np.ascontiguousarray(array, dtype=width)
+    made.flags.writeable = False
+    locked: Ints = made
+    return locked
+
+
+def branches_of(choice_to_branches: Ints, choices: Ints) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Return the branches of some choices, one after another, and where each choice's begin among them.
+
+    Parameters
+    ----------
+    choice_to_branches : array of int, ``[C+1]``
+    choices : array of int, ``[N]``
+
+    Returns
+    -------
+    branches : array of int64
+        Their branches in the order of `choices`.
+    offsets : array of int64, ``[N+1]``
+        The branches of ``choices[i]`` are ``branches[offsets[i]:offsets[i+1]]``.
+    """
+    first = choice_to_branches[choices].astype(np.int64)
+    offsets = np.zeros(len(choices) + 1, dtype=np.int64)
+    np.cumsum(choice_to_branches[choices + 1] - first, out=offsets[1:])
+    branches = np.arange(offsets[-1]) + np.repeat(first - offsets[:-1], np.diff(offsets))
+    return branches, offsets

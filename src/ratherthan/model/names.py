@@ -1,0 +1,127 @@
+"""Variables or strings enter, the name of one state leaves: names are made lazily, never a million at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from ratherthan.errors import ModelError, QuestionError
+
+__all__ = ["StateNames", "spell"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StateNames:
+    """How the states of a model are called.
+
+    Either `strings` (one per state), or `variables` (columns, one value per state), or neither: then a state has no
+    name but its number.
+
+    Parameters
+    ----------
+    count : int
+        The number of states, S.
+    strings : sequence of str, optional
+        A name per state, ``[S]``.
+    variables : mapping of str to array, optional
+        State variables in the order of their declaration, each ``[S]`` (bool, integer, float or str). A mapping that
+        decodes its columns on demand is welcome.
+    """
+
+    count: int
+    strings: Sequence[str] | None = None
+    variables: Mapping[str, npt.NDArray[np.generic]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.strings is not None and len(self.strings) != self.count:
+            raise ModelError(f"There must be one name per state: {self.count} states, got {len(self.strings)} names.")
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, state: int) -> str:
+        """Return the name of one state, its number where it has none."""
+        if self.strings is not None:
+            return str(self.strings[state])
+        if self.variables:
+            return ", ".join(f"{name}={spell(column[state])}" for name, column in self.variables.items())
+        return str(state)
+
+    @property
+    def named(self) -> bool:
+        """Whether states have names beside their numbers."""
+        return self.strings is not None or bool(self.variables)
+
+    def find(self, name: str) -> int:
+        """Return the state that is called `name` exactly.
+
+        Parameters
+        ----------
+        name : str
+            A name as `self[state]` gives it; for variables ``x=1, y=2`` in any order, and as few as single one state out.
+
+        Raises
+        ------
+        QuestionError
+            If no state, or more than one, is called so.
+        """
+        if self.strings is not None:
+            found = np.array([i for i, string in enumerate(self.strings) if string == name], dtype=np.int64)
+        elif self.variables:
+            found = np.flatnonzero(self._matching(name))
+        else:
+            found = np.empty(0, dtype=np.int64)
+        if len(found) == 1:
+            return int(found[0])
+        if len(found) == 0:
+            raise QuestionError(
+                f"A state must be a number from 0 to {self.count - 1} or an exact name, got '{name}'. "
+                f"Names look like {self._examples()}.",
+                state=name,
+            )
+        some = ", ".join(str(int(i)) for i in found[:5])
+        raise QuestionError(
+            f"A state's name must single out one state, but '{name}' fits {len(found)} states ({some}"
+            f"{', …' if len(found) > 5 else ''}). Give the state's number.",
+            state=name,
+        )
+
+    def _matching(self, name: str) -> npt.NDArray[np.bool_]:
+        match = np.ones(self.count, dtype=bool)
+        text = name.strip().removeprefix("(").removesuffix(")")
+        for part in text.split(","):
+            key, equals, value = part.partition("=")
+            column = self.variables.get(key.strip())
+            if not equals or column is None:
+                return np.zeros(self.count, dtype=bool)
+            match &= _equal(np.asarray(column), value.strip())
+        return match
+
+    def _examples(self) -> str:
+        if not self.named:
+            return f"0 … {self.count - 1} (this model has no state names)"
+        return ", ".join(f"'{self[i]}'" for i in range(min(3, self.count)))
+
+
+def spell(value: object) -> str:
+    """Return the value of a state variable as names show it: true, 0.5, 3."""
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if isinstance(value, float | np.floating):
+        return f"{float(value):g}"
+    return str(value)
+
+
+def _equal(column: npt.NDArray[np.generic], value: str) -> npt.NDArray[np.bool_]:
+    if column.dtype == np.bool_:
+        wanted = {"true": True, "false": False}.get(value.lower())
+        return np.zeros(len(column), dtype=bool) if wanted is None else column == np.bool_(wanted)
+    if np.issubdtype(column.dtype, np.number):
+        try:
+            return np.asarray(column == float(value))
+        except ValueError:
+            return np.zeros(len(column), dtype=bool)
+    return np.asarray(column == value)  # text, as fixed-width strings or as objects: one long string must not widen all

@@ -1,0 +1,192 @@
+"""A policy enters; what it reaches and earns, with proved bounds, leaves.
+
+Under a policy a model is a Markov chain: a state's row mixes the rows of its choices. The graph of the chain decides where
+the goal is reached with probability 0 or 1, and where nothing is paid on the way; the rest is one linear system, from every
+state of which the run is absorbed. With the expected cost, a state that reaches the goal with probability below 1 has the
+value ∞, whatever it pays.
+
+A state of which the policy says nothing must not be reached. Where it is not reached from the initial states, it and all
+states that may lead to it are left undecided: lower bound -∞, upper bound ∞.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ratherthan.errors import PolicyError
+from ratherthan.model import graph
+from ratherthan.model.index import Index, branches_of, build_index
+from ratherthan.model.mdp import Bools, Floats
+from ratherthan.model.policy import Policy
+from ratherthan.solve.certify import Parts, Tight, chain_bounds, never_falls, never_rises, outward
+from ratherthan.solve.linear import solve_chain
+from ratherthan.solve.rewards import SMALLEST
+from ratherthan.solve.sweeps import Sweeps, sweep_from_below, upper_vector
+from ratherthan.solve.system import System, build_system
+from ratherthan.solve.task import Goal
+
+__all__ = ["Chain", "Evaluated", "Guess", "chain_of", "evaluated", "nodes_of", "refuse_unsaid"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Chain:
+    """A model under a policy: one row per state, empty where the policy says nothing.
+
+    Parameters
+    ----------
+    index : Index
+        Its graph; choice s is the row of state s.
+    probability : array of float, ``[K]``
+    cost : array of float, ``[S]``
+    costly : array of bool, ``[S]``
+    said : array of bool, ``[S]``
+        Where the policy says something.
+    """
+
+    index: Index
+    probability: Floats  # [K]
+    cost: Floats  # [S]
+    costly: Bools  # [S]
+    said: Bools  # [S]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evaluated:
+    """The values of a policy with bounds; `open` is where they were computed, elsewhere they are exact (or undecided)."""
+
+    values: Floats  # [S]
+    lower: Floats  # [S]
+    upper: Floats  # [S]
+    open: Bools  # [S]
+    solves: int
+
+
+def chain_of(goal: Goal, policy: Policy) -> Chain:
+    """Return the model under a policy."""
+    index = goal.index
+    weights = policy.weights(goal.mdp)
+    sums = np.add.reduceat(weights, index.state_to_choices[:-1])
+    taken = np.flatnonzero(weights > 0.0)
+    state = index.choice_to_state[taken]
+    share = weights[taken] / sums[state]
+    branches, offsets = branches_of(index.choice_to_branches, taken)
+    lengths = np.diff(offsets)
+    row_to_branches = np.zeros(index.states + 1, dtype=np.int64)
+    np.cumsum(np.bincount(state, weights=lengths, minlength=index.states).astype(np.int64), out=row_to_branches[1:])
+    chain = build_index(np.arange(index.states + 1), row_to_branches, index.branch_to_target[branches])
+    cost = np.bincount(state, weights=share * goal.cost[taken], minlength=index.states)
+    costly = np.zeros(index.states, dtype=np.bool_)
+    costly[state[goal.costly[taken]]] = True
+    return Chain(
+        index=chain,
+        probability=goal.mdp.branch_to_probability[branches] * np.repeat(share, lengths),
+        cost=np.where(costly, np.maximum(cost, SMALLEST), 0.0),
+        costly=costly,
+        said=sums > 0.0,
+    )
+
+
+def refuse_unsaid(goal: Goal, chain: Chain) -> None:
+    """Raise PolicyError where the chain reaches, from the initial states, one of which the policy says nothing."""
+    mdp = goal.mdp
+    start = np.zeros(mdp.states, dtype=np.bool_)
+    start[mdp.initial] = True
+    unsaid = graph.reached_from(chain.index, start, ~goal.running) & goal.running & ~chain.said
+    if not unsaid.any():
+        return
+    state = int(np.argmax(unsaid))
+    called = f"{state} ('{mdp.names[state]}')" if mdp.names.named else str(state)
+    some = ", ".join(f"'{mdp.action_name(choice)}'" for choice in mdp.choices_of(state)[:5])
+    raise PolicyError(
+        f"A policy must say what to do in every state that it reaches, but it says nothing of state {called}"
+        f"{_more(unsaid)}. Add a line for it with one of its actions: {some}.",
+        state=state,
+    )
+
+
+def _more(states: Bools) -> str:
+    others = int(np.count_nonzero(states)) - 1
+    return f" and {others} more" if others else ""
+
+
+class Guess(NamedTuple):
+    """Values in two parts, with a margin, that may pass the check as they are."""
+
+    high: Floats  # [S]
+    low: Floats  # [S]
+    margin: Floats  # [S]
+
+
+def evaluated(goal: Goal, chain: Chain, guess: Guess | None = None) -> Evaluated:
+    """Return the values of the chain with proved bounds.
+
+    Parameters
+    ----------
+    goal : Goal
+    chain : Chain
+    guess : Guess, optional
+        What to check before anything is solved.
+
+    Returns
+    -------
+    Evaluated
+        Undecided states have the bounds -∞ and ∞ and the value 0.
+    """
+    index, running = chain.index, goal.running
+    lost = graph.can_reach(index, running & ~chain.said, running)
+    possible = graph.can_reach(index, goal.target, goal.through)
+    sure = graph.cannot_miss(index, goal.target, goal.through)
+    if goal.counts_cost:
+        pays = graph.can_reach(index, sure & running & chain.costly, sure & running)
+        open_ = sure & pays & ~lost
+        fixed = np.where(sure, 0.0, np.inf)
+    else:
+        open_ = possible & ~sure & ~lost
+        fixed = np.where(sure, 1.0, 0.0)
+    lower, upper, solves = fixed.copy(), fixed.copy(), 0
+    if open_.any():
+        fixed[open_], lower[open_], upper[open_] = _computed(goal, chain, open_, fixed, guess)
+        solves = 1
+    fixed[lost], lower[lost], upper[lost] = 0.0, -np.inf, np.inf
+    return Evaluated(values=fixed, lower=lower, upper=upper, open=open_, solves=solves)
+
+
+def nodes_of(open_: Bools, fixed: Floats) -> npt.NDArray[np.int64]:
+    """Return the node of each state, ``[S]``: open states are numbered, the others are the sinks of their value, 0 or 1."""
+    count = int(np.count_nonzero(open_))
+    node = np.where(fixed == 1.0, count + 1, count)
+    node[open_] = np.arange(count)
+    return node
+
+
+def _computed(
+    goal: Goal, chain: Chain, open_: Bools, fixed: Floats, guess: Guess | None
+) -> tuple[Floats, Floats, Floats]:
+    """Return the values of the open states and their bounds."""
+    system = build_system(chain.index, chain.probability, chain.cost, np.flatnonzero(open_), nodes_of(open_, fixed))
+    most = np.full(system.nodes, np.inf if goal.counts_cost else 1.0)
+    if guess is not None:
+        parts, margin = Parts(guess.high[open_], guess.low[open_]), guess.margin[open_]
+        if never_falls(system, *parts, -margin) and never_rises(system, *parts, margin):
+            lower, upper = outward(parts, margin)
+            return np.clip(parts.high + parts.low, lower, upper), lower, np.minimum(upper, most)
+    solved = solve_chain(system)
+    if solved is None:
+        return _swept(goal, system, most)
+    proved = chain_bounds(system, Tight(Parts(solved.high, solved.low), np.arange(system.nodes), solved.inverse))
+    lower = np.zeros(system.nodes) if proved[0] is None else proved[0]
+    upper = most if proved[1] is None else np.minimum(proved[1], most)
+    return np.clip(solved.high + solved.low, lower, upper), lower, upper
+
+
+def _swept(goal: Goal, system: System, most: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return values and bounds by value iteration, where no equation solver coped with the system."""
+    settings = Sweeps()
+    swept = sweep_from_below(system, goal.maximise, settings)
+    lower = swept.values if never_falls(system, swept.values) else np.zeros(system.nodes)
+    above = upper_vector(system, swept.values, goal.maximise, None if goal.counts_cost else settings)
+    return swept.values, lower, most if above is None else np.minimum(above, most)

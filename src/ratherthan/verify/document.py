@@ -1,0 +1,253 @@
+"""A stored explanation enters; what it says leaves, or an ExplanationError that names what was tampered with."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+from ratherthan.errors import ExplanationError, InputError, PropertyError
+from ratherthan.explain.explanation import Explanation, ObjectiveRecord, Tally
+from ratherthan.explain.question import Question
+from ratherthan.explain.record import digest, from_document, to_document
+from ratherthan.model.objective import ExpectedCost, Objective
+from ratherthan.model.problem import Problem
+from ratherthan.model.property import parse_property
+from ratherthan.narrate import narrate
+
+__all__ = ["OUTCOMES", "load", "objective_of", "refuse_foreign", "refuse_retold"]
+
+OUTCOMES = (
+    "The values are proved: one check by Bellman's operator confirmed the bounds.",
+    "Only the lower bounds are proved.",
+    "Only the upper bounds are proved.",
+    "The solver stopped before it converged; the bounds that were proved so far are given.",
+    "The values are not certified: no bounds are known, and no claim rests on them.",
+)
+"""How a solver may say it ended; the first is full success."""
+
+LOOSEST = 0.01
+"""A tolerance above one per cent would call different numbers equal."""
+
+_KINDS = {
+    "none": ("none", frozenset[str]()),
+    "naive-state": ("state", frozenset[str]()),
+    "responsibility": ("state", frozenset({"responsibility"})),
+    "constrictive": ("state", frozenset({"constrictiveness"})),
+    "naive-path": ("route", frozenset[str]()),
+    "selective": ("route", frozenset({"selectiveness"})),
+    "contrastive": ("route", frozenset({"selectiveness", "constrictiveness", "responsibility"})),
+}
+
+
+def _refuse(must: str, got: object, **place: Any) -> NoReturn:
+    raise ExplanationError(
+        f"{must}, got {got}. The explanation was changed after it was made, or belongs to another model: make it again.",
+        **place,
+    )
+
+
+def load(source: Mapping[str, Any] | str | Path) -> tuple[Explanation, str]:
+    """Return the explanation and the text of a document, once its form and its digest are found in order.
+
+    Parameters
+    ----------
+    source : mapping, str or Path
+        The document, or the path of a JSON file.
+
+    Raises
+    ------
+    ExplanationError
+    """
+    document = source if isinstance(source, Mapping) else _read(Path(source))
+    if not isinstance(document, Mapping):
+        raise ExplanationError(f"An explanation must be a JSON object, got {type(document).__name__}.")
+    try:
+        explanation, text = from_document(document)
+        claimed, own = document["digest"], digest(document)
+    except (ValueError, TypeError, OverflowError, RecursionError) as error:
+        raise ExplanationError(f"An explanation must be a JSON document of numbers and text; {error}.") from None
+    if claimed != own:
+        _refuse(f"The digest of an explanation must be that of its content, {own}", claimed)
+    for where, number in _integers(explanation):
+        if type(number) is not int:
+            _refuse(f"A state, choice or count must be a whole number at {where}", repr(number))
+    missing = {state for where, state in _states(explanation) if where != "policy"} - set(explanation.states)
+    if missing:
+        _refuse("Every state that is mentioned must have a record", f"none of state {min(missing)}")
+    _refuse_difference(document, to_document(explanation, text), "")
+    _refuse_contradictions(explanation)
+    return explanation, text
+
+
+def _refuse_difference(got: Any, wanted: Any, where: str) -> None:
+    """Raise where a document differs from what its own data would be written as, naming the first place."""
+    if isinstance(got, Mapping) and isinstance(wanted, Mapping) and got.keys() == wanted.keys():
+        for key in wanted:
+            _refuse_difference(got[key], wanted[key], f"{where}.{key}" if where else str(key))
+    elif isinstance(got, list | tuple) and isinstance(wanted, list) and len(got) == len(wanted):
+        for i, (one, other) in enumerate(zip(got, wanted, strict=True)):
+            _refuse_difference(one, other, f"{where}[{i}]")
+    elif got != wanted:
+        _refuse(f"The document must agree with itself: {where} must be {wanted!r}", repr(got), where=where)
+
+
+def _read(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"), parse_constant=_no_constant, object_pairs_hook=_once)
+    except OSError as error:
+        raise ExplanationError(f"An explanation must be a file that can be read: {path}: {error.strerror}.") from None
+    except (ValueError, RecursionError) as error:
+        raise ExplanationError(f"An explanation must be a JSON document, {path} is none: {error}.") from None
+
+
+def _no_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no JSON number")
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise ValueError(f"the key {key!r} stands there twice")
+        found[key] = value
+    return found
+
+
+def _integers(told: Explanation) -> Iterator[tuple[str, object]]:
+    """Yield every number that must be whole, with its place."""
+    yield "start", told.start
+    if told.question.state is not None:
+        yield "state", told.question.state
+    if told.question.search.horizon is not None:
+        yield "search.horizon", told.question.search.horizon
+    for name in ("route", "circle", "in_the_way", "size"):
+        yield from ((name, number) for number in getattr(told, name))
+    yield "circle_size", told.circle_size
+    yield "closing.off_route", told.closing.off_route
+    yield "closing.off_route_open", told.closing.off_route_open
+    for state, choice, _ in told.policy.choices:
+        yield "policy", state
+        yield "policy", choice
+    for record in told.states.values():
+        yield from (("states", number) for number in record.place or ())
+    for step in told.steps:
+        yield from (("steps", number) for number in (step.state, step.choice, step.choice_index))
+        for claim in step.claims:
+            for row in (claim.evidence.taken, *claim.evidence.others):
+                yield "claims", row.choice
+                if isinstance(row, Tally):
+                    yield from (("claims", number) for number in (row.lower, row.upper))
+            yield from (("claims", state) for state, _, _ in claim.evidence.follows)
+
+
+def _refuse_contradictions(told: Explanation) -> None:
+    """Raise where parts of a document contradict each other, whatever the model."""
+    asked = told.question
+    wanted = _kind_of(asked)
+    if asked.kind != wanted:
+        _refuse(f"The kind of this scope and these factors must be '{wanted}'", f"'{asked.kind}'")
+    if not 0.0 < asked.tolerance <= LOOSEST:
+        _refuse(f"The tolerance of comparisons must be above 0 and at most {LOOSEST}", asked.tolerance)
+    if asked.rather_than is not None and asked.scope != "state":
+        _refuse("'rather than' must ask about one state", f"scope '{asked.scope}'")
+    if told.outcome not in OUTCOMES:
+        _refuse("The outcome must be one of the solver's sentences", f"'{told.outcome}'")
+    if asked.state is not None and told.start != asked.state:
+        _refuse(f"The start must be the state asked about, {asked.state}", told.start)
+    if asked.scope != "route" and (told.route or told.route_probability is not None or told.arrival is not None):
+        _refuse("A route must be given only where one was asked for", f"scope '{asked.scope}'")
+    for step in told.steps:
+        for claim in step.claims:
+            names = tuple(row.action for row in claim.evidence.others)
+            if claim.against != names:
+                _refuse(f"'{claim.claim}' must be claimed against the actions of its evidence, {names}", claim.against)
+
+
+def _kind_of(asked: Question) -> str:
+    """Return what a combination of scope and factors is called."""
+    if asked.rather_than is not None:
+        return "rather-than"
+    for name, combination in _KINDS.items():
+        if combination == (asked.scope, asked.factors):
+            return name
+    listed = [name for name in ("selectiveness", "constrictiveness", "responsibility") if name in asked.factors]
+    return f"{asked.scope}: {', '.join(listed) or 'no factors'}"
+
+
+def objective_of(told: Explanation, problem: Problem) -> Objective:
+    """Return the objective of an explanation on a model.
+
+    Raises
+    ------
+    ExplanationError
+        If it does not fit the model, or its record says something else.
+    """
+    try:
+        wanted = parse_property(told.property, problem)
+    except PropertyError as error:
+        raise ExplanationError(f"The property of an explanation must fit the model: {error}", **error.place) from None
+    if not isinstance(wanted, Objective):
+        _refuse("The property of an explanation must ask for a value", f"'{told.property}'")
+    record = _record(wanted)
+    if told.objective != record:
+        _refuse(f"The record of the objective must say what the property says, {record}", told.objective)
+    return wanted
+
+
+def _record(wanted: Objective) -> ObjectiveRecord:
+    if isinstance(wanted, ExpectedCost):
+        return ObjectiveRecord(kind="cost", reward=wanted.reward, maximise=wanted.maximise)
+    if not wanted.maximise:
+        return ObjectiveRecord(kind="risk", maximise=False)
+    return ObjectiveRecord(kind="probability" if wanted.through is None else "safety", maximise=True)
+
+
+def refuse_foreign(told: Explanation, problem: Problem) -> None:
+    """Raise where an explanation names states, choices or actions that the model has not, or calls otherwise."""
+    mdp = problem.mdp
+    for where, state in _states(told):
+        if not 0 <= state < mdp.states:
+            _refuse(f"A state must be a number from 0 to {mdp.states - 1} at {where}", state, state=state)
+    for state, record in told.states.items():
+        place = None if problem.world is None else problem.world.place(state)
+        name, named = mdp.names[state], mdp.names.named
+        if (record.name, record.named, record.place) != (name, named, place):
+            _refuse(
+                f"State {state} must be called '{name}' at {place}", f"'{record.name}' at {record.place}", state=state
+            )
+    for step in told.steps:
+        own = mdp.choices_of(step.state)
+        rows = [row for claim in step.claims for row in (claim.evidence.taken, *claim.evidence.others)]
+        for choice, action in [(step.choice, step.action), *((row.choice, row.action) for row in rows)]:
+            if choice not in own:
+                _refuse(f"State {step.state} has the choices {own.start} to {own.stop - 1}", choice, state=step.state)
+            if action != mdp.action_name(choice):
+                _refuse(f"Choice {choice} must be called '{mdp.action_name(choice)}'", f"'{action}'", state=step.state)
+        if step.choice_index != step.choice - own.start:
+            _refuse(f"Choice {step.choice} must be number {step.choice - own.start} of its state", step.choice_index)
+        if step.foil != told.question.rather_than:
+            _refuse(f"The foil must be what was asked about, {told.question.rather_than!r}", repr(step.foil))
+
+
+def _states(told: Explanation) -> Iterator[tuple[str, int]]:
+    """Yield every state that is mentioned, with its place in the document."""
+    yield "start", told.start
+    for name in ("route", "circle", "in_the_way", "states"):
+        yield from ((name, state) for state in getattr(told, name))
+    yield from (("policy", state) for state, _, _ in told.policy.choices)
+    for step in told.steps:
+        yield "steps", step.state
+        for claim in step.claims:
+            yield from (("claims", state) for state, _, _ in claim.evidence.follows)
+
+
+def refuse_retold(told: Explanation, text: str) -> None:
+    """Raise where the text is not what the explanation's data say."""
+    try:
+        own = narrate(told)
+    except (InputError, KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
+        raise ExplanationError(f"An explanation must be one that can be told: {error}.") from None
+    if own != text:
+        _refuse(f"The text must be what the data say, '{own}'", f"'{text}'")

@@ -1,0 +1,301 @@
+"""A problem and an objective enter, a Frame leaves: which states end, what each choice costs, and plain searches on the graph.
+
+A run of an objective passes through *running* states and ends in a *target* or, where a formula forbids to go on, in a state
+that is *out*. The searches here are fixpoints of sets of states, computed a layer at a time over arrays:
+
+* ``reach(to, via, rows)``: where some policy that uses `rows` reaches `to` with positive probability: the least set;
+* ``keep(inside, rows)``: the largest part of a set that can be kept for sure: every state has a row with all branches in it;
+* ``sure(to, via, rows)``: where some policy reaches `to` with probability 1: the largest set X such that `to` is reached with
+  rows whose branches all stay in X (de Alfaro 1997);
+* ``blocks``: maximal end components, where a run can go round for ever.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from ratherthan.model.formula import states_where
+from ratherthan.model.mdp import MDP, Bools, Floats
+from ratherthan.model.objective import ExpectedCost, Objective
+from ratherthan.model.problem import Problem
+
+__all__ = ["Array", "Frame", "frame_of", "slices"]
+
+Array = npt.NDArray[np.int64]
+
+DENSE = 300
+"""Up to so many states components are found by squaring a matrix, without a library."""
+
+
+def slices(first: Array, last: Array) -> Array:
+    """Return all numbers of the ranges first[i] … last[i] - 1, one after the other."""
+    counts = last - first
+    total = int(counts.sum())
+    if total == 0:
+        return np.zeros(0, dtype=np.int64)
+    skipped = np.repeat(first - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
+    result: Array = skipped + np.arange(total)
+    return result
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Frame:
+    """An objective on a model.
+
+    Parameters
+    ----------
+    mdp : MDP
+    maximise : bool
+    costs : bool
+        Whether an expected cost is wanted, else a probability.
+    reward : str, optional
+        The name of the reward; None counts steps.
+    target, out : array of bool, ``[S]``
+        Where a run ends: where it was to go, and where it may not go on.
+    row_state : array of int, ``[C]``
+        The state of each choice.
+    entry_row : array of int, ``[B]``
+        The choice of each branch.
+    """
+
+    mdp: MDP
+    maximise: bool
+    costs: bool
+    reward: str | None
+    target: Bools  # [S]
+    out: Bools  # [S]
+    row_state: Array  # [C]
+    entry_row: Array  # [B]
+
+    @property
+    def running(self) -> Bools:
+        """Where a run has not ended, ``[S]``."""
+        return ~(self.target | self.out)
+
+    @property
+    def risk(self) -> bool:
+        """Whether a probability is to be kept small: then there is no goal to arrive at."""
+        return not self.costs and not self.maximise
+
+    @property
+    def goal(self) -> Bools:
+        """Where a run has ended well, ``[S]``."""
+        return self.out if self.risk else self.target
+
+    @property
+    def hazard(self) -> Bools:
+        """Where a run has ended badly, ``[S]``."""
+        return self.target if self.risk else self.out
+
+    @cached_property
+    def can_arrive(self) -> Bools:
+        """Where some policy reaches the goal with positive probability, ``[S]``; everywhere where there is no goal."""
+        if self.risk:
+            return np.ones(self.mdp.states, dtype=np.bool_)
+        return self.reach(self.target, self.running)
+
+    @cached_property
+    def share(self) -> Floats:
+        """The probabilities of the branches, rows summing to 1, ``[B]``."""
+        sums = np.add.reduceat(self.mdp.branch_to_probability, self.mdp.choice_to_branches[:-1])
+        return np.asarray(self.mdp.branch_to_probability / sums[self.entry_row], dtype=np.float64)
+
+    @cached_property
+    def price(self) -> Floats:
+        """The expected immediate reward of each choice, ``[C]``; 0 where a probability is wanted."""
+        if not self.costs:
+            return np.zeros(self.mdp.choices)
+        if self.reward is None:
+            return np.ones(self.mdp.choices)
+        parts = self.mdp.rewards[self.reward]
+        total = np.zeros(self.mdp.choices)
+        if parts.branch is not None:
+            total += np.add.reduceat(self.share * parts.branch, self.mdp.choice_to_branches[:-1])
+        if parts.choice is not None:
+            total += parts.choice
+        if parts.state is not None:
+            total += parts.state[self.row_state]
+        return np.where(self.pays, np.maximum(total, 5e-324), 0.0)
+
+    @cached_property
+    def pays(self) -> Bools:
+        """Which choices cost more than nothing, ``[C]``."""
+        if not self.costs:
+            return np.zeros(self.mdp.choices, dtype=np.bool_)
+        if self.reward is None:
+            return np.ones(self.mdp.choices, dtype=np.bool_)
+        parts, found = self.mdp.rewards[self.reward], np.zeros(self.mdp.choices, dtype=np.bool_)
+        if parts.state is not None:
+            found |= parts.state[self.row_state] > 0
+        if parts.choice is not None:
+            found |= parts.choice > 0
+        if parts.branch is not None:
+            found[self.entry_row[parts.branch > 0]] = True
+        return found
+
+    @cached_property
+    def _into(self) -> tuple[Array, Array]:
+        """The branches sorted by their target, and where those of each target begin."""
+        order = np.argsort(self.mdp.branch_to_target, kind="stable").astype(np.int64)
+        first = np.searchsorted(self.mdp.branch_to_target[order], np.arange(self.mdp.states + 1)).astype(np.int64)
+        return order, first
+
+    def rows_into(self, states: Array) -> Array:
+        """Return the choices with a branch into `states` (some more than once)."""
+        order, first = self._into
+        return self.entry_row[order[slices(first[states], first[states + 1])]]
+
+    def branches_from(self, states: Array) -> tuple[Array, Array]:
+        """Return origin and target of every branch of every choice of some states."""
+        mdp = self.mdp
+        begin = mdp.choice_to_branches[mdp.state_to_choices[states]].astype(np.int64)
+        end = mdp.choice_to_branches[mdp.state_to_choices[states + 1]].astype(np.int64)
+        return np.repeat(states, end - begin), mdp.branch_to_target[slices(begin, end)].astype(np.int64)
+
+    def explored(self, start: int) -> Bools:
+        """Return what any choices can reach from a state, itself included; where a run has ended nothing goes on, ``[S]``."""
+        found = np.zeros(self.mdp.states, dtype=np.bool_)
+        layer = np.array([start], dtype=np.int64)
+        while len(layer):
+            found[layer] = True
+            _, near = self.branches_from(layer[self.running[layer]])
+            layer = np.unique(near[~found[near]])
+        return found
+
+    def rows_within(self, inside: Bools) -> Bools:
+        """Return which choices have all branches inside a set, ``[C]``."""
+        good: Bools = np.logical_and.reduceat(inside[self.mdp.branch_to_target], self.mdp.choice_to_branches[:-1])
+        return good
+
+    def reach(self, to: Bools, via: Bools, rows: Bools | None = None) -> Bools:
+        """Return the states of `to`, and those of `via` from which it can be reached through `via`, ``[S]``."""
+        seen = to.copy()
+        frontier = np.flatnonzero(to)
+        while len(frontier):
+            into = self.rows_into(frontier)
+            if rows is not None:
+                into = into[rows[into]]
+            states = self.row_state[into]
+            frontier = np.unique(states[via[states] & ~seen[states]])
+            seen[frontier] = True
+        return seen
+
+    def keep(self, inside: Bools, free: Bools, rows: Bools | None = None) -> Bools:
+        """Return the largest part of a set whose states each have a row that stays in it; `free` states need none."""
+        inside = inside.copy()
+        usable = np.ones(self.mdp.choices, dtype=np.bool_) if rows is None else rows.copy()
+        usable &= self.rows_within(inside)
+        left = np.bincount(self.row_state[usable], minlength=self.mdp.states)
+        frontier = np.flatnonzero(inside & ~free & (left == 0))
+        while len(frontier):
+            inside[frontier] = False
+            lost = np.unique(self.rows_into(frontier))
+            lost = lost[usable[lost]]
+            usable[lost] = False
+            np.subtract.at(left, self.row_state[lost], 1)
+            touched = np.unique(self.row_state[lost])
+            frontier = touched[inside[touched] & ~free[touched] & (left[touched] == 0)]
+        return inside
+
+    def sure(self, to: Bools, via: Bools, rows: Bools | None = None) -> Bools:
+        """Return the states from which some policy reaches `to` through `via` with probability 1, ``[S]``."""
+        inside = self.reach(to, via, rows)
+        while True:
+            kept = self.keep(inside, to, rows)
+            usable = self.rows_within(kept) if rows is None else self.rows_within(kept) & rows
+            reached = self.reach(to, via & kept, usable)
+            if (reached == inside).all():
+                return inside
+            inside = reached
+
+    def blocks(self, inside: Bools, rows: Bools) -> tuple[Array, Bools]:
+        """Return the maximal end component of each state within a set (-1 for none) and the rows that stay in them.
+
+        Parameters
+        ----------
+        inside : array of bool, ``[S]``
+        rows : array of bool, ``[C]``
+            Which choices a component may use.
+        """
+        alive = inside.copy()
+        usable = rows & alive[self.row_state] & self.rows_within(alive)
+        while True:
+            alive &= np.bincount(self.row_state[usable], minlength=self.mdp.states) > 0
+            usable &= alive[self.row_state] & self.rows_within(alive)
+            entry = np.flatnonzero(usable[self.entry_row])
+            origin, target = self.row_state[self.entry_row[entry]], self.mdp.branch_to_target[entry]
+            part = parts(self.mdp.states, origin, target.astype(np.int64))
+            crossing = np.zeros(self.mdp.choices, dtype=np.bool_)
+            crossing[self.entry_row[entry[part[origin] != part[target]]]] = True
+            empty = alive & (np.bincount(self.row_state[usable & ~crossing], minlength=self.mdp.states) == 0)
+            if not crossing.any() and not empty.any():
+                return np.where(alive, part, -1), usable
+            usable &= ~crossing
+
+
+def parts(count: int, origin: Array, target: Array) -> Array:
+    """Return the strongly connected component of each state of a graph, ``[count]``."""
+    if len(origin) == 0:
+        return np.arange(count, dtype=np.int64)
+    present = np.unique(np.concatenate([origin, target]))
+    local = np.zeros(count, dtype=np.int64)
+    local[present] = np.arange(len(present))
+    if len(present) <= DENSE:
+        found = _parts_by_squaring(len(present), local[origin], local[target])
+    else:
+        found = _parts_by_library(len(present), local[origin], local[target])
+    result = np.arange(count, dtype=np.int64)
+    result[present] = present[found]
+    return result
+
+
+def _parts_by_squaring(count: int, origin: Array, target: Array) -> Array:
+    """Return the first member of each state's component: reachability there and back."""
+    reach = np.eye(count, dtype=np.bool_)
+    reach[origin, target] = True
+    while True:
+        further = (reach.astype(np.float32) @ reach.astype(np.float32)) > 0
+        if (further == reach).all():
+            return np.asarray(np.argmax(reach & reach.T, axis=1), dtype=np.int64)
+        reach = further
+
+
+def _parts_by_library(count: int, origin: Array, target: Array) -> Array:
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    matrix = csr_array((np.ones(len(origin), dtype=np.int8), (origin, target)), shape=(count, count))
+    _, component = connected_components(matrix, directed=True, connection="strong")
+    first = np.full(int(component.max()) + 1, count, dtype=np.int64)
+    np.minimum.at(first, component, np.arange(count))
+    return np.asarray(first[component], dtype=np.int64)
+
+
+def frame_of(problem: Problem, objective: Objective) -> Frame:
+    """Return an objective on a problem's model.
+
+    Raises
+    ------
+    PropertyError
+        For a formula that does not fit the model.
+    """
+    mdp = problem.mdp
+    target = states_where(mdp, objective.goal, problem.definitions)
+    out = np.zeros(mdp.states, dtype=np.bool_)
+    costs = isinstance(objective, ExpectedCost)
+    if not isinstance(objective, ExpectedCost) and objective.through is not None:
+        out = ~states_where(mdp, objective.through, problem.definitions) & ~target
+    return Frame(
+        mdp=mdp,
+        maximise=objective.maximise,
+        costs=costs,
+        reward=objective.reward if isinstance(objective, ExpectedCost) else None,
+        target=target,
+        out=out,
+        row_state=np.repeat(np.arange(mdp.states), np.diff(mdp.state_to_choices)).astype(np.int64),
+        entry_row=np.repeat(np.arange(mdp.choices), np.diff(mdp.choice_to_branches)).astype(np.int64),
+    )

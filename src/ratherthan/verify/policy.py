@@ -1,0 +1,147 @@
+"""The policy that an explanation lists enters; how often it takes each choice leaves, and checks of the list and of each step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ratherthan.explain.explanation import Explanation, Step
+from ratherthan.model.mdp import Bools, Floats
+from ratherthan.verify.frame import Frame
+from ratherthan.verify.interval import never_above, order_all
+from ratherthan.verify.paths import Moves, moves_of
+from ratherthan.verify.values import Band
+from ratherthan.verify.verdict import Check, Verdict
+
+__all__ = ["PolicyCheck"]
+
+SHARES = 1e-9
+"""How far the shares of a randomised policy may be from 1 in a state."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PolicyCheck:
+    """Checks the policy that is listed, which is the one explained.
+
+    Parameters
+    ----------
+    frame : Frame
+    told : Explanation
+    initial : set of int
+        The initial states of the model.
+    """
+
+    frame: Frame
+    told: Explanation
+    initial: frozenset[int]
+
+    @cached_property
+    def weight(self) -> Floats:
+        """How often the policy takes each choice of its state, ``[C]``; 0 throughout a state where nothing is said."""
+        weight = np.zeros(self.frame.mdp.choices)
+        for _, choice, share in self.told.policy.choices:
+            weight[choice] = share
+        return weight
+
+    @cached_property
+    def said(self) -> Bools:
+        """Where the policy says what to do, ``[S]``."""
+        said = np.zeros(self.frame.mdp.states, dtype=np.bool_)
+        said[self.frame.row_state[self.weight > 0]] = True
+        return said
+
+    @cached_property
+    def moves(self) -> Moves:
+        """The moves of the policy."""
+        return moves_of(self.frame, self.weight)
+
+    def reached(self, states: Iterable[int]) -> Bools:
+        """Return what the policy reaches from some states, ``[S]``."""
+        found = np.zeros(self.frame.mdp.states, dtype=np.bool_)
+        for state in states:
+            if not found[state]:
+                found |= self.moves.reached(state)
+        return found
+
+    def entries(self) -> Check:
+        """Check that the list is a policy of the model, where the explanation can lead."""
+        reason = self._entry() or self._extent()
+        verdict = Verdict.FAILS if reason else Verdict.HOLDS
+        return Check(what="policy", where="", verdict=verdict, reason=reason or "")
+
+    def _entry(self) -> str | None:
+        """Return what is wrong with an entry of the list."""
+        mdp, entries = self.frame.mdp, self.told.policy.choices
+        total: Floats = np.zeros(mdp.states)
+        for state, choice, share in entries:
+            own = mdp.choices_of(state)
+            if choice not in own:
+                return f"state {state} has the choices {own.start} to {own.stop - 1}, got {choice}"
+            if not 0.0 < share <= 1.0:
+                return f"a share must be above 0 and at most 1, got {share} at state {state}"
+            if share != 1.0 and not self.told.policy.given:
+                return f"the optimum takes one choice in each state, got a share of {share} at state {state}"
+            total[state] += share
+        chosen = [choice for _, choice, _ in entries]
+        if chosen != sorted(set(chosen)):
+            return "choices must be listed once, in the order of the model"
+        said = np.flatnonzero(total)
+        wrong = said[np.abs(total[said] - 1.0) > SHARES]
+        return f"the shares of state {wrong[0]} must sum to 1, got {total[wrong[0]]:.10g}" if len(wrong) else None
+
+    def _extent(self) -> str | None:
+        """Return what is listed though it is never reached, or not listed though it is."""
+        frame, told = self.frame, self.told
+        reached = self.reached(told.states)
+        needed = reached & frame.running
+        if told.policy.given and told.question.policy_values:
+            for state in told.states:
+                if not reached[state] or frame.running[state]:
+                    reached |= frame.explored(state)
+        odd = np.flatnonzero(self.said & ~(reached & frame.running))
+        if len(odd):
+            return f"state {odd[0]} is listed but never reached, or nothing is left to do there"
+        silent = np.flatnonzero(needed & ~self.said)
+        if told.policy.given:  # it need not say anything where it never comes to from an initial state
+            silent = silent[self.reached([told.start])[silent]] if told.start in self.initial else silent[:0]
+        return f"state {silent[0]} is reached, but the policy says nothing of it" if len(silent) else None
+
+    def attains(self, best: Band, followed: Band) -> Check:
+        """Check that the optimal policy is one: its values are the optimum wherever it is listed."""
+        tolerance = self.told.question.tolerance
+        ends = (best.lower[self.said], best.upper[self.said]), (followed.lower[self.said], followed.upper[self.said])
+        more, less = order_all(*ends, tolerance)
+        apart = np.flatnonzero(more | less)
+        where = np.flatnonzero(self.said)
+        if len(apart):
+            state = int(where[apart[0]])
+            reason = f"it is not optimal: another does better from state {state}"
+            return Check(
+                what="optimum", where=self.frame.mdp.names[state], state=state, verdict=Verdict.FAILS, reason=reason
+            )
+        same = never_above(*ends, tolerance) & never_above(ends[1], ends[0], tolerance)
+        verdict = Verdict.HOLDS if bool(same.all()) else Verdict.UNDECIDED
+        return Check(what="optimum", where="", verdict=verdict)
+
+    def step(self, step: Step) -> Check:
+        """Check that a step takes the policy's choice, as often as it says."""
+        reason = self._taken(step)
+        verdict = Verdict.FAILS if reason else Verdict.HOLDS
+        name = self.frame.mdp.names[step.state]
+        return Check(what="choice", where=name, state=step.state, verdict=verdict, reason=reason or "")
+
+    def _taken(self, step: Step) -> str | None:
+        mdp, weight = self.frame.mdp, self.weight
+        if not self.frame.running[step.state]:
+            return "the objective has ended here"
+        own = mdp.choices_of(step.state)
+        if weight[step.choice] == 0.0:
+            return f"the policy takes {[mdp.action_name(c) for c in own if weight[c] > 0]}, got '{step.action}'"
+        if step.share != weight[step.choice]:
+            return f"it is taken with a share of {weight[step.choice]}, got {step.share}"
+        if self.told.question.scope == "state" and step.choice != max(own, key=lambda c: (weight[c], -c)):
+            return "the policy takes another choice more often"
+        return None

@@ -1,0 +1,305 @@
+"""Properties in PRISM's syntax: what is read, what it becomes, what is refused and which neighbour is offered instead."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ratherthan.errors import PropertyError
+from ratherthan.model.mdp import MDP, Reward
+from ratherthan.model.names import StateNames
+from ratherthan.model.objective import ExpectedCost, Objective, ReachAvoid, Threshold
+from ratherthan.model.problem import Problem
+from ratherthan.model.property import choose_objective, parse_property
+
+COST = Reward(choice=np.ones(5))
+
+
+def problem(**changes: Any) -> Problem:
+    """A chain of four states; the first has two choices."""
+    fields: dict[str, Any] = {
+        "state_to_choices": np.array([0, 2, 3, 4, 5]),
+        "choice_to_branches": np.arange(6),
+        "branch_to_target": np.array([1, 2, 2, 3, 3]),
+        "branch_to_probability": np.ones(5),
+        "initial": np.array([0]),
+        "labels": {"goal": np.array([0, 0, 0, 1], dtype=bool), "h": np.array([0, 1, 0, 0], dtype=bool)},
+        "rewards": {"cost": COST},
+        "names": StateNames(count=4, variables={"x": np.arange(4), "busy": np.array([True, True, False, False])}),
+    }
+    of_problem = {name: changes.pop(name) for name in ("properties", "objective", "definitions") if name in changes}
+    return Problem(**({"mdp": MDP(**(fields | changes))} | of_problem))
+
+
+PROBLEM = problem(definitions={"N": "K + 1", "K": "2", "p": "0.25", "late": "x > 2 | busy"})
+TWO_REWARDS = problem(rewards={"cost": COST, "time": COST})
+GOAL = '"goal"'
+CHAIN = problem(
+    state_to_choices=np.arange(5),
+    choice_to_branches=np.arange(5),
+    branch_to_target=np.array([1, 2, 3, 3]),
+    branch_to_probability=np.ones(4),
+    rewards={"cost": Reward(choice=np.ones(4))},
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ('R{"cost"}min=? [ F "goal" ]', ExpectedCost(goal=GOAL, reward="cost")),
+        ('R{"cost"}max=?[F "goal"]', ExpectedCost(goal=GOAL, reward="cost", maximise=True)),
+        ('Rmin=? [F "goal"]', ExpectedCost(goal=GOAL, reward="cost")),
+        ('Rmax=? [F "goal"]', ExpectedCost(goal=GOAL, reward="cost", maximise=True)),
+        ('Rmin{"cost"}=? [F "goal"]', ExpectedCost(goal=GOAL, reward="cost")),
+        ('R[exp]{"cost"}min=? [F "goal"]', ExpectedCost(goal=GOAL, reward="cost")),
+        ('Tmin=? [F "goal"]', ExpectedCost(goal=GOAL, reward=None)),
+        ('Tmax=? [F "goal"]', ExpectedCost(goal=GOAL, reward=None, maximise=True)),
+        ('Pmax=? [F "goal"]', ReachAvoid(goal=GOAL)),
+        ('P max =? [F "goal"]', ReachAvoid(goal=GOAL)),
+        ('Pmin=? [F "goal"]', ReachAvoid(goal=GOAL, maximise=False)),
+        ('Pmax=? [(F ("goal"))]', ReachAvoid(goal=GOAL)),
+        ('Pmax=? [!"h" U "goal"]', ReachAvoid(goal=GOAL, through='!"h"')),
+        ('Pmax=? [true U "goal"]', ReachAvoid(goal=GOAL)),
+        ('Pmax=? [("h" | busy) U ("goal" & x = 3)]', ReachAvoid(goal='"goal" & x = 3', through='"h" | busy')),
+        ("Pmax=? [late U x = N]", ReachAvoid(goal="x = 2 + 1", through="x > 2 | busy")),
+        ("Pmax=? [F late & x=K*N]", ReachAvoid(goal="(x > 2 | busy) & x = 2 * (2 + 1)")),
+        ('"my name": Pmax=? [F "goal"]; // the way home\n', ReachAvoid(goal=GOAL)),
+        ('// the way home\nPmax=? [\n F // there\n "goal"\n]', ReachAvoid(goal=GOAL)),
+    ],
+)
+def test_objectives_are_read(text: str, wanted: Objective) -> None:
+    assert parse_property(text, PROBLEM) == wanted
+    assert parse_property(wanted.text, PROBLEM) == wanted
+
+
+@pytest.mark.parametrize(
+    ("text", "maximise", "relation", "bound"),
+    [
+        ('P>=0.9 [F "goal"]', False, ">=", 0.9),
+        ('P>0 [F "goal"]', False, ">", 0),
+        ('P<=1 [F "goal"]', True, "<=", 1),
+        ('P<p [F "goal"]', True, "<", 0.25),
+        ('Pmin>=1 [F "goal"]', False, ">=", 1),
+        ('Pmax>=1-p [F "goal"]', True, ">=", 0.75),
+        ('Pmin<0.123456789 [F "goal"]', False, "<", 0.123456789),
+        ('R{"cost"}<=5 [F "goal"]', True, "<=", 5),
+        ('R{"cost"}>=5 [F "goal"]', False, ">=", 5),
+        ('R{"cost"}min<=N*2 [F "goal"]', False, "<=", 6),
+        ('Tmax>1e3 [F "goal"]', True, ">", 1000),
+    ],
+)
+def test_a_bound_without_min_or_max_must_hold_under_every_policy(
+    text: str, maximise: bool, relation: str, bound: float
+) -> None:
+    read = parse_property(text, PROBLEM)
+    assert isinstance(read, Threshold)
+    assert (read.objective.maximise, read.relation, read.bound) == (maximise, relation, bound)
+    assert read.objective.goal == GOAL
+    assert parse_property(read.text, PROBLEM) == read
+
+
+def test_without_decisions_min_and_max_need_not_be_said() -> None:
+    assert parse_property('P=? [F "goal"]', CHAIN) == ReachAvoid(goal=GOAL)
+    assert parse_property('R=? [F "goal"]', CHAIN) == ExpectedCost(goal=GOAL, reward="cost")
+    for text in ('P=? [F "goal"]', 'R{"cost"}=? [F "goal"]', 'T=? [F "goal"]'):
+        with pytest.raises(PropertyError, match="must say min or max"):
+            parse_property(text, PROBLEM)
+
+
+@pytest.mark.parametrize(
+    ("text", "what", "nearest"),
+    [
+        ('Pmax=? [F<=5 "goal"]', "F with a bound", 'Pmax=? [F "goal"]'),
+        ("Pmin=? [F<=K (x=2)]", "F with a bound", "Pmin=? [F x = 2]"),
+        ("Pmax=? [F[1,K+3] busy]", "F with a bound", "Pmax=? [F busy]"),
+        ("Pmax=? [F<=max(2,K) x=1]", "F with a bound", "Pmax=? [F x = 1]"),
+        ("Pmax=? [F<=2*(K+1) x=1]", "F with a bound", "Pmax=? [F x = 1]"),
+        ("Pmax=? [G>K-1 !busy]", "G with a bound", "Pmin=? [F busy]"),
+        ("Pmax=? [busy U<= 3 // steps\n x=1]", "U with a bound", "Pmax=? [busy U x = 1]"),
+        ('Pmax=? [F^{rew{"u"}>=5} busy]', "F with a bound", "Pmax=? [F busy]"),
+        ('Pmax=? [true Urew{"u"}>=5 (x = 0)]', "U with a bound", "Pmax=? [true U x = 0]"),
+        ('Pmax=? [busy Usteps<=200 "goal"]', "U with a bound", 'Pmax=? [busy U "goal"]'),
+        ('Pmax>=0.9 [busy U<=7 "goal"]', "U with a bound", 'Pmax=? [busy U "goal"]'),
+        ("Pmax=? [G<=7 busy]", "G with a bound", "Pmin=? [F !busy]"),
+        ('R{"cost"}max=? [Csteps<=200]', "C with a bound", "[F "),
+        ('R{"cost"}max=? [C<=200]', "C with a bound", "[F "),
+        ('R{"cost"}max=? [C]', "C (a reward that adds up without end)", "[F "),
+        ('R{"cost"}max=? [I=3]', "I (the reward at one instant)", "[F "),
+        ('R{"cost"}max=? [S]', "A long-run average", "[F "),
+        ('R{"cost"}max=? [LRA]', "A long-run average", "[F "),
+        ("S=? [busy]", "A long-run average", "[F "),
+        ('LRAmax=? ["goal"]', "A long-run average", "[F "),
+        ('Pmax=? [G !"h"]', "G (always)", 'Pmin=? [F "h"]'),
+        ("Pmin=? [G x<2]", "G (always)", "Pmax=? [F !(x < 2)]"),
+        ('Pmax=? [X "goal"]', "X (after one step)", 'Pmax=? [F "goal"]'),
+        ('Pmax=? [busy W "goal"]', "W (weak until)", 'Pmin=? [busy & !"goal" U !busy & !"goal"]'),
+        ('Pmax=? [busy R "goal"]', "R (release)", 'Pmin=? [!busy U !"goal"]'),
+        ('Pmax=? [G F "goal"]', "A formula of linear temporal logic", 'Pmax=? [F "goal"]'),
+        ('Pmax=? [(G !"h") & (F "goal")]', "A formula of linear temporal logic", 'Pmax=? [F "goal"]'),
+        ('Pmax=? [F "h" & F "goal"]', "A formula of linear temporal logic", 'Pmax=? [F "goal"]'),
+        ('Pmax=? [!(F "goal")]', "A formula of linear temporal logic", 'Pmax=? [F "goal"]'),
+        ('Pmin=? ["h" & !G<=3 !"goal"]', "A formula of linear temporal logic", 'Pmin=? [F "goal"]'),
+        ('R{"cost"}min=? [F "h" & X "goal"]', "A formula of linear temporal logic", 'R{"cost"}min=? [F "goal"]'),
+        ('Pmax=? [busy U "h" U "goal"]', "A formula of linear temporal logic", 'Pmax=? [F "goal"]'),
+        ('Pmax=? [F P>=0.5 [F "goal"]]', "A property inside a property", "[F "),
+        ('Pmax=? [F busy & Rmin<=3 [F "goal"]]', "A property inside a property", "[F "),
+        ('Pmax=? [E [F "goal"] U busy]', "A property inside a property", "[F "),
+        ('multi(Pmax=? [F "goal"], P>=0.5 [F "h"])', "Several objectives at once", "each of them alone"),
+        ('filter(max, Pmax=? [F "goal"], busy)', "A filter over states", "the property without it"),
+        ('Pmax=? [F "goal" {busy}]', "A filter over states", "the property without it"),
+        ('A [F "goal"]', "A or E", 'Pmin>=1 [F "goal"]'),
+        ('<<1>> Pmax=? [F "goal"]', "A property of players", "without players"),
+        ('[[1]] Pmax=? [F "goal"]', "A property of players", "without players"),
+        ("quantile(max A, Pmax>0.5 [F busy])", "A quantile", "threshold"),
+        ('Pmax=? [F "goal"] + 1', "A combination of properties", "each of them alone"),
+        ('R[var]{"cost"}min=? [F busy]', "A spread", "expected reward"),
+        ('R{"cost"}/{"cost"}min=? [F busy]', "A ratio", "each reward alone"),
+        ('P=0.5 [F "goal"]', "A value compared with = or !=", "threshold"),
+        ('R{"cost"}min=? [busy U "goal"]', "A reward until anything but F", 'R{"cost"}min=? [F "goal"]'),
+        ('Tmin=? [F<=3 "goal"]', "A reward until anything but F", 'Tmin=? [F "goal"]'),
+        ("Pmax=? [busy]", "A property without a temporal operator", "Pmax=? [F busy]"),
+    ],
+)
+def test_what_cannot_be_explained_is_refused_by_name_with_its_nearest(text: str, what: str, nearest: str) -> None:
+    with pytest.raises(PropertyError) as caught:
+        parse_property(text, PROBLEM)
+    assert caught.value.message.startswith(what)
+    assert "cannot be explained here. The nearest that can: " in caught.value.message
+    assert nearest in caught.value.message
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "at column 1, got the end"),
+        ("hello", "such as Pmax=\\? .* at column 1, got 'hello'"),
+        ('"goal"', "such as Pmax"),
+        ('Pmax [F "goal"]', "must have '=' at column 6"),
+        ('Pmax=? F "goal"', "must have '\\[' at column 8"),
+        ('Pmax=? [F "goal"', "must have '\\]' at column 17, got the end"),
+        ('Pmax=? [F "goal"] "h"', "one property at a time\\) at column 19"),
+        ("Pmax=? [F x = & 3]", "at column 15, got '& 3\\]'"),
+        ('Pmax=? ["goal" U ]', "at column 18"),
+        ("Pmax=? [F x]", "must be true or false, but 'x' is a number"),
+        ('Pmax=? [x U "goal"]', "must be true or false, but 'x' is a number"),
+        ('Pmax=? [F "gaol"]', "one of the model's: 'goal', 'h'.* got 'gaol'"),
+        ('Pmax=? ["gaol" U "goal"]', "got 'gaol'"),
+        ("Pmax=? [F goal]", 'Labels stand in quotation marks: "goal"'),
+        ('R{"cots"}min=? [F "goal"]', "A reward must be one of the model's: 'cost'; got 'cots'"),
+        ('Rmin=? [F "goal"', "must have '\\]' at column 17, got the end"),
+        ('R[first]{"cost"', "A spread rather than"),
+        ("R[exp", "must have '\\]' at column 6, got the end"),
+        ("R[best of]", "must have 'exp' at column 3, got 'best of\\]'"),
+        ("Pmax=? [F x == 3]", "must have '=' at column 13, got '== 3\\]'. PRISM writes '=', not '=='"),
+        ("Pmax=? [F busy -> x = 3]", "must have '=>' at column 16, got '-> x = 3\\]'. PRISM writes '=>', not '->'"),
+        ("Pmax=? [F ~busy]", "must have '!' at column 11, got '~busy\\]'. PRISM writes '!', not '~'"),
+        ("Pmax=? [F busy && x = 3]", "PRISM writes '&', not '&&'"),
+        ('Pmax=? [F "goal]', "at column 11, got a quotation mark that is never closed"),
+        ("Pmax=? [F max(x, 1 > 1]", "must have ',' or '\\)' at column 23, got '\\]'"),
+        ('R{1}min=? [F "goal"]', "the name of a reward in quotation marks.* at column 3"),
+        ('P>=1.5 [F "goal"]', "must lie between 0 and 1, got 1.5"),
+        ('P>=-1 [F "goal"]', "must lie between 0 and 1, got -1"),
+        ('R{"cost"}<=-1 [F "goal"]', "must be finite and at least 0, got -1"),
+        ('P>=0/0 [F "goal"]', "must lie between 0 and 1, got nan"),
+        ('P>=x [F "goal"]', "a number or a constant of the source, got 'x'"),
+        ('P>=busy [F "goal"]', "a number or a constant of the source, got 'busy'"),
+        ('P>=true [F "goal"]', "A bound must have a number, but 'true' is a truth value"),
+        ("Pmax=? [F " + "(" * 3000 + "busy" + ")" * 3000 + "]", "nested too deeply"),
+    ],
+)
+def test_a_wrong_property_is_refused_with_its_reason(text: str, said: str) -> None:
+    with pytest.raises(PropertyError, match=said):
+        parse_property(text, PROBLEM)
+
+
+def test_a_reward_must_be_named_where_there_are_several_or_none() -> None:
+    with pytest.raises(PropertyError, match=r"must name its reward where the model has several.*'cost', 'time'"):
+        parse_property('Rmin=? [F "goal"]', TWO_REWARDS)
+    with pytest.raises(PropertyError, match=r"it has none.*Tmin"):
+        parse_property('Rmin=? [F "goal"]', problem(rewards={}))
+
+
+def test_variables_may_bear_the_names_of_operators() -> None:
+    columns = {name: np.arange(4) for name in "FGXUWRPSTC"}
+    odd = problem(names=StateNames(count=4, variables=columns | {"I": np.arange(4) > 2, "E": np.arange(4) > 1}))
+    for name in columns:
+        assert parse_property(f"Pmax=? [F {name} = 3]", odd) == ReachAvoid(goal=f"{name} = 3")
+        compound = f"1 < {name} & {name} + 1 > 2"
+        assert parse_property(f"Pmax=? [{compound} U ({compound})]", odd) == ReachAvoid(goal=compound, through=compound)
+        compared = f"{name} <= 2 + 1 & {name} - 1 >= 0 & {name} < max(3, 1) & {name} != 3"
+        assert parse_property(f"Pmax=? [{compared} U {compared}]", odd) == ReachAvoid(goal=compared, through=compared)
+    assert parse_property("Pmax=? [I U E]", odd) == ReachAvoid(goal="E", through="I")
+    assert parse_property("Pmax=? [F I]", odd) == ReachAvoid(goal="I")
+
+
+@pytest.mark.parametrize("name", list("FGXUWRPSTCIAE"))
+def test_a_truth_value_may_bear_the_name_of_an_operator(name: str) -> None:
+    odd = problem(names=StateNames(count=4, variables={name: np.arange(4) > 1}))
+    assert parse_property(f'Pmax=? [!{name} U {name} & "goal"]', odd) == ReachAvoid(
+        goal=f'{name} & "goal"', through=f"!{name}"
+    )
+    assert parse_property(f'Pmax=? [{name} U "goal"]', odd) == ReachAvoid(goal=GOAL, through=name)
+    assert parse_property(f"Pmax=? [F {name}]", odd) == ReachAvoid(goal=name)
+
+
+@given(st.text(alphabet='PRTminax=?[]{}"goalhxbusy FGUX!&|<>0123().;:/\n', max_size=40))
+def test_any_text_is_read_or_refused_in_a_sentence(text: str) -> None:
+    try:
+        read = parse_property(text, PROBLEM)
+    except PropertyError:
+        return
+    assert parse_property(read.text, PROBLEM) == read
+
+
+# -- what is wanted, if nobody says so -----------------------------------------------------------------------------------
+
+
+def test_a_text_or_the_name_of_a_property_of_the_source_is_wanted() -> None:
+    own = {"home": ReachAvoid(goal=GOAL), "quick": ExpectedCost(goal=GOAL, reward=None)}
+    with_own = problem(properties=own, objective=own["quick"])
+    assert choose_objective(with_own, "home") is own["home"]
+    assert choose_objective(with_own, '"home"') is own["home"]
+    assert choose_objective(with_own, 'Pmin=? [F "h"]') == ReachAvoid(goal='"h"', maximise=False)
+    assert choose_objective(with_own) is own["quick"]
+    with pytest.raises(PropertyError, match="one of the source's own: 'home', 'quick'; got 'hom'"):
+        choose_objective(with_own, "hom")
+
+
+def test_the_only_property_of_the_source_is_wanted() -> None:
+    own = ReachAvoid(goal='"h"')
+    assert choose_objective(problem(properties={"a": own})) is own
+
+
+@pytest.mark.parametrize("label", ["goal", "target", "destination"])
+def test_else_the_only_reward_until_the_only_goal_is_wanted(label: str) -> None:
+    mask = np.array([0, 0, 0, 1], dtype=bool)
+    there = problem(labels={label: mask, "elsewhere": mask})
+    assert choose_objective(there) == ExpectedCost(goal=f'"{label}"', reward="cost")
+    several = {"a": ReachAvoid(goal='"elsewhere"'), "b": ReachAvoid(goal='"elsewhere"', maximise=False)}
+    assert choose_objective(problem(labels={label: mask, "elsewhere": mask}, properties=several)) == choose_objective(
+        there
+    )
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"labels": {"h": np.array([0, 0, 0, 1], dtype=bool)}},
+        {"labels": {name: np.array([0, 0, 0, 1], dtype=bool) for name in ("goal", "target")}},
+        {"rewards": {}},
+        {"rewards": {"cost": COST, "time": COST}},
+    ],
+)
+def test_else_what_there_is_is_listed_with_an_example_that_works(changes: dict[str, Any]) -> None:
+    open_problem = problem(**changes)
+    with pytest.raises(PropertyError) as caught:
+        choose_objective(open_problem)
+    message = caught.value.message
+    for name in (*open_problem.mdp.labels, *open_problem.mdp.rewards):
+        assert name in message
+    example = message.rsplit("--property '", 1)[1].removesuffix("'.")
+    assert parse_property(example, open_problem).goal  # type: ignore[union-attr]
