@@ -66,6 +66,7 @@ def test_a_library_is_imported_only_in_its_room(path):
         ("io/prism.py", "import stormpy.core as core"),
         ("io/prism.py", "import importlib\nimportlib.import_module('stormpy')"),
         ("io/prism.py", "def f():\n    from lark import Lark"),
+        ("io/_gym_explore.py", "from gymnasium import spaces"),
         ("render/svg.py", "from rich.text import Text"),
         ("explain/route.py", "from ratherthan.apps import cli"),
         ("explain/route.py", "from ratherthan import apps"),
@@ -80,6 +81,7 @@ def test_a_library_in_the_wrong_room_is_found(path, text):
     [
         ("solve/_kernels.py", "from numba import njit"),
         ("io/_storm.py", "import stormpy"),
+        ("io/gymnasium.py", "def f():\n    import gymnasium"),
         ("model/reading.py", "from lark import Lark"),
         ("apps/cli.py", "import click\nfrom ratherthan.apps import text"),
         ("__main__.py", "from ratherthan.apps.cli import run"),

@@ -351,3 +351,24 @@ def test_things_that_are_no_policy_are_refused(mdp):
             read_policy(source, mdp)
     with pytest.raises(PolicyError):
         read_policy(Policy(choice=np.array([5, 4, 5])), mdp)
+
+
+def test_many_states_are_found_by_the_values_of_their_variables_in_any_spelling():
+    count = 3000
+    x, half = np.arange(count) % 50, np.arange(count) // 50 / 3
+    mdp = MDP(
+        state_to_choices=np.arange(count + 1),
+        choice_to_branches=np.arange(count + 1),
+        branch_to_target=np.arange(count),
+        branch_to_probability=np.ones(count),
+        choice_to_action=np.zeros(count, dtype=int),
+        actions=("stay",),
+        initial=np.array([0]),
+        names=StateNames(count=count, variables={"x": x, "half": half}),
+    )
+    said = {f"(half={half[i]:g},x={x[i]})": "stay" for i in range(0, count, 3)}
+    said |= {mdp.names[i]: 0 for i in range(1, count, 3)}
+    assert np.flatnonzero(read_policy(said, mdp).choice < 0).tolist() == list(range(2, count, 3))
+    assert "fits" in refusal({"x=1": 0}, mdp)
+    assert "'(x=1,half=77)'" in refusal({"(x=1,half=77)": 0}, mdp)
+    assert "'(x=1,z=0)'" in refusal({"(x=1,z=0)": 0}, mdp)

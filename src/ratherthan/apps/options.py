@@ -133,7 +133,10 @@ def source_options(*keys: str) -> Callable[[F], Callable[..., Any]]:
         decorated: Callable[..., Any] = gathered
         for key in reversed(keys):
             decorated = _SOURCE[key](decorated)
-        return argument("source", tells="An example such as example:paper-5x5, or a model's file.")(decorated)
+        return argument(
+            "source",
+            tells="An example such as example:paper-5x5, an environment such as gym:FrozenLake-v1, or a model's file.",
+        )(decorated)
 
     return decorate
 

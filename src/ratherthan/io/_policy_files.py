@@ -1,4 +1,4 @@
-"""A policy's file enters (JSON, CSV or .npy); an array, a mapping or rows of state, action and probability leave."""
+"""A policy's file enters; an array, a mapping, rows of state, action and probability, or another tool's export leave."""
 
 from __future__ import annotations
 
@@ -6,27 +6,33 @@ import csv
 import io
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ratherthan.errors import PolicyError
+from ratherthan.io import _policy_prism as prism
+from ratherthan.io import _policy_storm as storm
 from ratherthan.io._files import open_source
 from ratherthan.io._npy import array_from
+from ratherthan.io._policy_rows import Row, Rows, probability
+from ratherthan.model.mdp import MDP
+from ratherthan.model.policy import Policy
 
-__all__ = ["SUM_TOLERANCE", "Row", "Rows", "mapping_rows", "read_policy_file"]
-
-SUM_TOLERANCE = 1e-6
-"""How far the probabilities of a state may be from 1 in a file; what is nearer is rescaled to 1."""
-
-Row = tuple[Any, Any, float]
-"""A state, an action, and its probability: NaN where it is certain."""
+__all__ = ["Foreign", "read_policy_file"]
 
 
-class Rows(list[Row]):
-    """What a policy says, row by row."""
+class Foreign(NamedTuple):
+    """What another tool exported, and the function that fits it to a model."""
+
+    content: Any
+    reader: Callable[[Any, MDP, str], Policy]
+
+    def read(self, mdp: MDP, what: str) -> Policy:
+        """Return the policy; `what` is how it is called in errors."""
+        return self.reader(self.content, mdp, what)
 
 
 def read_policy_file(path: str | os.PathLike[str], what: str) -> Any:
@@ -41,8 +47,7 @@ def read_policy_file(path: str | os.PathLike[str], what: str) -> Any:
                 raise PolicyError(f"{what} must be a whole .npy file, but it is not: {error}. Save it anew.") from error
         file.seek(0)
         data = file.read()
-    if suffix in (".npy", ".npz"):
-        raise PolicyError(f"{what} must be a NumPy file of one array (.npy), but it is none. Save it with numpy.save.")
+    _refuse_binary(data, suffix, what)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -50,8 +55,34 @@ def read_policy_file(path: str | os.PathLike[str], what: str) -> Any:
     if "\x00" in text:
         raise PolicyError(f"{what} must be text in UTF-8 or a .npy file, but it is binary.")
     if suffix == ".json" or (suffix != ".csv" and text.lstrip().startswith(("{", "["))):
-        return _json(text, what)
-    return _csv_rows(text, what)
+        content = _json(text, what)
+        return Foreign(content, storm.read_storm_json) if content and storm.is_storm_json(content) else content
+    return (None if suffix == ".csv" else _foreign_text(text, what)) or _csv_rows(text, what)
+
+
+def _refuse_binary(data: bytes, suffix: str, what: str) -> None:
+    """Refuse what is no text, with the reason."""
+    if suffix in (".npy", ".npz"):
+        raise PolicyError(f"{what} must be a NumPy file of one array (.npy), but it is none. Save it with numpy.save.")
+    if data.startswith((b"PK\x03\x04", b"\x80")) or suffix in (".zip", ".pkl", ".pickle", ".pt", ".pth"):
+        raise PolicyError(
+            f"{what} must be text or a .npy file, but it is a saved agent or another pickle, which can run any program when "
+            "it is opened. Where you trust it, open it yourself, as with agent = stable_baselines3.PPO.load(path), and give "
+            "the agent: ratherthan.read_policy(agent, problem.mdp)."
+        )
+
+
+def _foreign_text(text: str, what: str) -> Foreign | None:
+    """Return what another tool exported as text, None where it is of no form that is known."""
+    if text.lstrip().startswith("digraph"):
+        raise PolicyError(
+            f"{what} must list states and actions, but it is a drawing (DOT). Export it with -exportstrat FILE:type=actions."
+        )
+    if storm.is_storm_text(text):
+        return Foreign(text, storm.read_storm_text)
+    if prism.is_induced(text):
+        return Foreign(text, prism.read_induced)
+    return Foreign(text, prism.read_strategy) if prism.is_strategy(text) else None
 
 
 def _json(text: str, what: str) -> Any:
@@ -67,26 +98,6 @@ def _json(text: str, what: str) -> Any:
         return json.loads(text, object_pairs_hook=once)
     except (ValueError, RecursionError) as error:
         raise PolicyError(f'{what} must be JSON like {{"10": "east"}}, but it cannot be read: {error}.') from error
-
-
-def mapping_rows(source: Mapping[Any, Any], what: str) -> Rows:
-    """Return state, action and probability out of a mapping."""
-    rows = Rows()
-    for state, said in source.items():
-        if isinstance(said, Mapping):
-            if not said:
-                raise PolicyError(f"{what} must give an action at state {state!r}, got none. Leave the state out.")
-            rows += [(state, action, _probability(chance, state, what)) for action, chance in said.items()]
-        else:
-            rows.append((state, said, np.nan))
-    return rows
-
-
-def _probability(given: Any, state: Any, what: str) -> float:
-    number = isinstance(given, int | float | np.integer | np.floating) and not isinstance(given, bool)
-    if not number or not 0 <= given <= 1 + SUM_TOLERANCE:
-        raise PolicyError(f"{what} must give probabilities between 0 and 1, got {given!r} at state {state!r}.")
-    return float(given)
 
 
 def _csv_rows(text: str, what: str) -> Rows:
@@ -142,4 +153,4 @@ def _csv_row(cells: list[str], columns: dict[str, int], where: str) -> Row:
         chance = float(cells[columns["probability"]])
     except ValueError:
         raise PolicyError(f"{where} a probability must be a number, got '{cells[columns['probability']]}'.") from None
-    return state, action, _probability(chance, state, where)
+    return state, action, probability(chance, state, where)

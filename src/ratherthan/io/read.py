@@ -12,6 +12,9 @@ UMB            ``.umb``; a tar archive, gzip or xz                  `ratherthan.
 NumPy archive  ``.npz``; a zip archive                              `ratherthan.io.arrays`
 PRISM          ``.prism .nm .pm .sm``; ``mdp`` or ``dtmc``          `ratherthan.io.prism`
 JANI           ``.jani``; ``"jani-version"`` in a JSON object       `ratherthan.io.jani`
+DRN            ``.drn .drn.gz .drn.xz``; a line ``@type:``          `ratherthan.io.drn`
+Gymnasium      ``gym:NAME``, ``gym:NAME,key=value``; an environment `ratherthan.io.gymnasium`
+its table      ``.json.gz``; ``"nS"`` or ``"P"`` in a JSON object   `ratherthan.io.gymnasium`
 object         a Problem or MDP as it is; arrays                    `ratherthan.io.arrays`
 ============== ==================================================== ===========================
 """
@@ -44,6 +47,7 @@ COMMENTS = re.compile(rb"//[^\n]*|/\*.*?\*/", re.DOTALL)
 PRISM_WORD = re.compile(
     rb"^\s*(mdp|dtmc|nondeterministic|probabilistic|ctmc|stochastic|pta|pomdp|smg|module)\s", re.MULTILINE
 )
+DRN_LINE = re.compile(rb"^@type:", re.MULTILINE)
 ROADMAP_LINE = re.compile(rb"^map\s*=\s*('''|\"\"\"|'|\")", re.MULTILINE)
 
 
@@ -77,10 +81,25 @@ PRISM = Adapter(
     text=True,
 )
 JANI = Adapter(kind="a JANI model", module="jani", function="read_jani", suffixes=(".jani",), constants=True, text=True)
-ADAPTERS = (ROADMAP, UMB, NPZ, PRISM, JANI)
+DRN = Adapter(
+    kind="a model in Storm's explicit text format",
+    module="drn",
+    function="read_drn",
+    suffixes=(".drn", ".drn.gz", ".drn.xz"),
+)
+TABLE = Adapter(kind="a table of an environment", module="gymnasium", function="read_table", suffixes=(".json.gz",))
+ADAPTERS = (ROADMAP, UMB, NPZ, PRISM, JANI, DRN, TABLE)
 PREFIX = "example:"
+GYM = Adapter(kind="a Gymnasium environment", module="gymnasium", function="read_gymnasium", suffixes=())
+GYM_PREFIX = "gym:"
+ENVIRONMENT = ("reset", "step", "action_space", "observation_space")
 
-WRITERS = {".umb": ("umb", "write_umb"), ".npz": ("npz", "write_npz"), ".roadmap": ("roadmap", "write_roadmap")}
+WRITERS = {
+    ".umb": ("umb", "write_umb"),
+    ".npz": ("npz", "write_npz"),
+    ".drn": ("drn", "write_drn"),
+    ".roadmap": ("roadmap", "write_roadmap"),
+}
 
 
 def read(
@@ -95,8 +114,9 @@ def read(
 
     Parameters
     ----------
-    source : str, path, Problem, MDP or arrays
-        ``example:NAME``, a file, a model as it is, or transitions as `from_arrays` takes them.
+    source : str, path, Problem, MDP, environment or arrays
+        ``example:NAME``, ``gym:NAME``, a file, a model as it is, an environment of Gymnasium, or transitions as
+        `from_arrays` takes them.
     constants : str or mapping, optional
         Values for the constants of a PRISM or JANI model, ``"N=5,K=2"`` or ``{"N": 5, "K": 2}``.
     objective : str, optional
@@ -104,7 +124,7 @@ def read(
     start : int or str, optional
         The state to start from, a number or an exact name, in place of the model's initial states.
     **options
-        Handed to the adapter: `limits` of archives, `rewards`, `labels` … of arrays.
+        Handed to the adapter: `limits` of archives, `rewards`, `labels` … of arrays, arguments of an environment.
 
     Returns
     -------
@@ -146,6 +166,9 @@ def _read(source: Any, constants: str | Mapping[str, Any] | None, options: dict[
     if isinstance(source, str) and source.startswith(PREFIX):
         _refuse_constants(constants, EXAMPLE, source)
         return EXAMPLE.load()(source.removeprefix(PREFIX), **options)
+    if isinstance(source, str) and source.startswith(GYM_PREFIX):
+        _refuse_constants(constants, GYM, source)
+        return GYM.load()(source.removeprefix(GYM_PREFIX), **options)
     if isinstance(source, str | os.PathLike):
         adapter = _adapter_of(source)
         if adapter.constants:
@@ -160,6 +183,10 @@ def _read(source: Any, constants: str | Mapping[str, Any] | None, options: dict[
                 f"A model that is read already takes no options, got {', '.join(options)}. Leave them out."
             )
         return source if isinstance(source, Problem) else Problem(mdp=source, source="an MDP")
+    if all(hasattr(source, name) for name in ENVIRONMENT):
+        from ratherthan.io.gymnasium import read_environment
+
+        return read_environment(source, **options)
     from ratherthan.io.arrays import from_arrays
 
     return from_arrays(**source, **options) if isinstance(source, Mapping) else from_arrays(source, **options)
@@ -176,11 +203,11 @@ def _refuse_constants(constants: object, adapter: Adapter, shown: str) -> None:
 def _adapter_of(path: str | os.PathLike[str]) -> Adapter:
     """Return what reads a file: by its suffix, else by its first bytes."""
     shown = os.fspath(path)
-    suffix = Path(path).suffix.lower()
+    name = Path(path).name.lower()
     with open_source(path) as file:
         head = file.read(HEAD)
     for adapter in ADAPTERS:
-        if suffix in adapter.suffixes:
+        if name.endswith(adapter.suffixes):
             break
     else:
         adapter = _by_content(head, shown)
@@ -192,6 +219,10 @@ def _adapter_of(path: str | os.PathLike[str]) -> Adapter:
 
 
 def _by_content(head: bytes, shown: str) -> Adapter:
+    from ratherthan.io._gym_json import is_table
+
+    if is_table(head):
+        return TABLE
     if is_tar(head) or packing_of(head):
         return UMB
     if head.startswith(b"PK\x03\x04"):
@@ -201,12 +232,14 @@ def _by_content(head: bytes, shown: str) -> Adapter:
     if b"\x00" not in head:
         if ROADMAP_LINE.search(head):
             return ROADMAP
+        if DRN_LINE.search(head):
+            return DRN
         if PRISM_WORD.search(COMMENTS.sub(b" ", head)):
             return PRISM
     known = "; ".join(f"{adapter.kind} ({' '.join(adapter.suffixes)})" for adapter in ADAPTERS)
     raise SourceError(
-        f"A source must be {PREFIX}NAME or one of: {known}; but '{shown}' is none of them, by its name nor by its contents. "
-        "Convert it, or give it the suffix of what it is.",
+        f"A source must be {PREFIX}NAME, {GYM_PREFIX}NAME or one of: {known}; but '{shown}' is none of them, by its name nor "
+        "by its contents. Convert it, or give it the suffix of what it is.",
         path=shown,
     )
 
@@ -218,8 +251,9 @@ def write(problem: Problem, path: str | os.PathLike[str], **options: Any) -> Non
     ----------
     problem : Problem
     path : path
-        ``.umb`` for the Unified Markov Binary format, ``.npz`` for a NumPy archive, ``.roadmap`` for a problem that came
-        from a road map.
+        ``.umb`` for the Unified Markov Binary format, ``.npz`` for a NumPy archive, ``.drn`` for Storm's explicit text
+        format (which has no place for names of states, map, objective and words), ``.roadmap`` for a problem that came from
+        a road map.
     **options
         Handed to the writer.
 

@@ -68,7 +68,7 @@ FORMS = ("table", "json", "csv", "parquet")
     "--policy",
     section="Policy",
     metavar="FILE",
-    help="Judge this policy (JSON, CSV or a Q table in .npy), not the best one.",
+    help="Judge this policy (JSON, CSV, .npy, or an export of Storm or PRISM), not the best one.",
 )
 @option("--minimise-q", section="Policy", is_flag=True, help="In a Q table the smallest number is taken.")
 @output_options(*FORMS)

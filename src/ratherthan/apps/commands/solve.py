@@ -18,7 +18,12 @@ FORMS = ("text", "json")
 
 @click.command("solve", cls=Command, examples=EXAMPLES, short_help="Print the best value, with bounds that are proved.")
 @source_options("properties", "constants", "start")
-@option("--policy", section="Policy", metavar="FILE", help="The value of this policy (JSON, CSV or a Q table in .npy).")
+@option(
+    "--policy",
+    section="Policy",
+    metavar="FILE",
+    help="The value of this policy (JSON, CSV, .npy, or an export of Storm or PRISM).",
+)
 @option("--minimise-q", section="Policy", is_flag=True, help="In a Q table the smallest number is taken.")
 @output_options(*FORMS)
 def command(wanted: Wanted, form: str | None, output: str | None, **given: Any) -> None:

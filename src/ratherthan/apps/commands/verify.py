@@ -17,13 +17,13 @@ FORMS = ("text", "json")
     "verify", cls=Command, examples=EXAMPLES, short_help="Check a stored explanation against its model, claim by claim."
 )
 @argument("explanation", tells="What `ratherthan explain --format json` wrote.")
-@source_options("constants", "start")
+@source_options("constants", "start", "lexicon")
 @output_options(*FORMS)
 @click.pass_context
 def command(context: click.Context, wanted: Wanted, explanation: str, form: str | None, output: str | None) -> None:
     """Check every claim of EXPLANATION (a JSON file) against SOURCE, without the code that made it.
 
-    SOURCE must be what was explained: give the same --constants and --start again.
+    SOURCE must be what was explained: give the same --constants, --start and --lexicon again.
 
     The exit code is 0 where nothing fails and 2 where something does, or where the explanation was tampered with.
     """
