@@ -72,7 +72,7 @@ def _bounded(solution: Solution, paid: Floats, k: int, of_policy: bool) -> tuple
         mean, spread = _mean(mdp, index, getattr(solution, name)[k])
         total = paid + mean
         exact = (spread == 0.0) & (paid == 0.0)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             error = (np.diff(mdp.choice_to_branches) + 8) * (
                 ROUNDING * (np.abs(paid) + np.abs(mean) + spread) + UNDERFLOW
             )

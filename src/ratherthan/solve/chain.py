@@ -149,7 +149,8 @@ def evaluated(goal: Goal, chain: Chain, guess: Guess | None = None) -> Evaluated
         fixed = np.where(sure, 1.0, 0.0)
     lower, upper, solves = fixed.copy(), fixed.copy(), 0
     if open_.any():
-        fixed[open_], lower[open_], upper[open_] = _computed(goal, chain, open_, fixed, guess)
+        with np.errstate(all="ignore"):  # numbers beyond doubles become ±∞ or NaN, which no check lets pass
+            fixed[open_], lower[open_], upper[open_] = _computed(goal, chain, open_, fixed, guess)
         solves = 1
     fixed[lost], lower[lost], upper[lost] = 0.0, -np.inf, np.inf
     return Evaluated(values=fixed, lower=lower, upper=upper, open=open_, solves=solves)

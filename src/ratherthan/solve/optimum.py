@@ -52,6 +52,12 @@ def optimum(task: Task, method: Method, progress: Progress | None = None) -> Opt
     method : PolicyIteration or Sweeps
     progress : callable, optional
     """
+    with np.errstate(all="ignore"):  # numbers beyond doubles become ±∞ or NaN, which no check lets pass
+        return _optimum(task, method, progress)
+
+
+def _optimum(task: Task, method: Method, progress: Progress | None) -> Optimum:
+    """Return the optimum of a task."""
     goal = task.goal
     if not task.open.any():
         choice = first_tied(task, task.internal | task.attaining)
