@@ -34,7 +34,7 @@ def test_a_state_is_taken_by_number_and_by_name(said, fork):
 def test_a_number_wins_over_a_name(said, tmp_path, fork_with):
     names = rt.StateNames(count=4, strings=["1", "0", "market", "ditch"])
     rt.write(rt.Problem(mdp=fork_with(names=names)), tmp_path / "numbers.npz")
-    assert " at 0" in said("explain", tmp_path / "numbers.npz", "--state", "1", "--kind", "naive-state")
+    assert "at state 1 (0)." in said("explain", tmp_path / "numbers.npz", "--state", "1", "--kind", "naive-state")
 
 
 def test_one_of_several_initial_states_is_picked(document, refused, two_starts):

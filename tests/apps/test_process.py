@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -63,23 +62,6 @@ def test_a_small_map_is_explained_without_compilers_and_sparse_solvers():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stderr.strip() == "[]"
-
-
-@pytest.mark.slow
-def test_nobody_waits_for_help_or_for_a_small_map(process, tmp_path):
-    installed = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(tmp_path)}  # compiled once, as pip does
-
-    def seconds(*words: str) -> float:
-        """The least time of several runs: what the machine does beside it is not our matter."""
-        times = []
-        for _ in range(6):
-            begin = time.perf_counter()
-            assert process(*words, env=installed).returncode == 0
-            times.append(time.perf_counter() - begin)
-        return min(times)
-
-    assert seconds("--help") < 0.3
-    assert seconds("explain", "example:city-1") < 1.0
 
 
 @posix

@@ -49,7 +49,9 @@ def test_a_given_policy_and_given_words_are_confirmed(said, fork, tmp_path):
     (tmp_path / "words.toml").write_text('[actions]\nleft = "turn left"\n')
     options = ("--policy", tmp_path / "policy.json", "--lexicon", tmp_path / "words.toml")
     said("explain", fork, *options, "--output", tmp_path / "said.json")
-    assert "contradicted: 0, undecided: 0" in said("verify", tmp_path / "said.json", fork)
+    same = ("--lexicon", tmp_path / "words.toml")
+    assert "contradicted: 0, undecided: 0" in said("verify", tmp_path / "said.json", fork, *same)
+    assert "contradicted: 0, undecided: 1" in said("verify", tmp_path / "said.json", fork)
 
 
 def test_a_start_that_was_picked_is_confirmed(said, two_starts, tmp_path):

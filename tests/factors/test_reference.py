@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from random_models import OBJECTIVES, Table, problem_of, random_problem, random_table
 
-from ratherthan.factors import Search, constrictiveness, critical_states, responsibility, search_tree
+from ratherthan.factors import Search, constrictiveness, critical_states, nearer_goal, responsibility, search_tree
 from ratherthan.model.objective import ExpectedCost
 from ratherthan.model.problem import Problem
 from ratherthan.solve import solve
@@ -165,12 +165,12 @@ def test_the_counting_search_agrees_with_the_tree_itself(seed: int, toward: bool
     solution = solve(problem)
     mdp, ended = problem.mdp, solution.ended
     critical = critical_states(mdp, responsibility(solution), ended)
-    better = -solution.values[0] if solution.objectives[0].maximise else solution.values[0]
+    nearer = nearer_goal(solution.lower[0], solution.upper[0], maximise=solution.objectives[0].maximise)
     search = Search(horizon=random.choice([None, 0, 1, 2]), toward_goal=toward)
-    counts = constrictiveness(mdp, critical, ended, range(mdp.choices), search=search, better=better)
+    counts = constrictiveness(mdp, critical, ended, range(mdp.choices), search=search, nearer=nearer)
     size = np.diff(mdp.state_to_choices)
     for choice in range(mdp.choices):
-        tree = search_tree(mdp, ended, choice, search=search, better=better)
+        tree = search_tree(mdp, ended, choice, search=search, nearer=nearer[0])
         assert mdp.state_of(choice) not in tree
         assert len(set(tree.tolist())) == len(tree)
         assert counts[choice].lower == size[tree][critical.certain[tree]].sum()

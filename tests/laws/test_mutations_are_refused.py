@@ -16,7 +16,7 @@ from ratherthan.errors import ExplanationError
 from ratherthan.model.problem import Problem
 from ratherthan.verify import verify
 
-CASES = max(30, MODELS // 10)
+CASES = max(20, MODELS // 15)
 PER_CASE = 25
 
 HARMLESS = {

@@ -35,8 +35,8 @@ class Judge:
     asked: Question
 
     def measured(self, choice: int) -> Measured:
-        """Return a choice with its number and, where that is an infinite cost, its fate."""
-        number = self.measures.measured(choice, omega=self.asked.omega)
+        """Return a choice with its action value q and, where that is an infinite cost, its fate."""
+        number = self.measures.measured(choice)
         return Measured(
             choice=choice,
             action=self.solution.problem.mdp.action_name(choice),
@@ -45,8 +45,14 @@ class Judge:
         )
 
     def spread(self, state: int) -> tuple[Interval, Interval]:
-        """Return λmax and λmin of a state with their bounds."""
-        numbers = [self.measured(choice).number for choice in self.solution.problem.mdp.choices_of(state)]
+        """Return λmax and λmin of a state with their bounds, from q or on request from ω."""
+        own = self.solution.problem.mdp.choices_of(state)
+        numbers = [self.measures.measured(choice, omega=self.asked.omega) for choice in own]
+        return _extreme(numbers, highest=True), _extreme(numbers, highest=False)
+
+    def difference(self, state: int) -> tuple[Interval, Interval]:
+        """Return the largest and the smallest q of a state with their bounds."""
+        numbers = [self.measures.measured(choice) for choice in self.solution.problem.mdp.choices_of(state)]
         return _extreme(numbers, highest=True), _extreme(numbers, highest=False)
 
     def outcome(self, state: int, choice: int) -> list[Claim]:

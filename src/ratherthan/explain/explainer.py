@@ -28,6 +28,7 @@ from ratherthan.factors import (
     Responsibility,
     constrictiveness,
     critical_states,
+    nearer_goal,
     responsibility,
 )
 from ratherthan.model.objective import ExpectedCost, Objective, ReachAvoid
@@ -122,14 +123,19 @@ class Factors:
 
     def counts(self, choices: Iterable[int]) -> dict[int, Constrictiveness]:
         """Return how many decisions each of `choices` leaves open."""
-        values = self.solution.policy_values[0] if self.asked.policy_values else self.solution.values[0]
+        solution = self.solution
+        if self.asked.policy_values:
+            lower, upper = solution.policy_lower[0], solution.policy_upper[0]
+        else:
+            lower, upper = solution.lower[0], solution.upper[0]
+        toward = nearer_goal(lower, upper, maximise=solution.objectives[0].maximise, tolerance=self.asked.tolerance)
         return constrictiveness(
             self.solution.problem.mdp,
             self.critical,
             self.solution.ended,
             choices,
             search=self.asked.search,
-            better=-values if self.solution.objectives[0].maximise else values,
+            nearer=toward if self.asked.search.toward_goal else None,
         )
 
 
@@ -293,7 +299,7 @@ class _Explainer:
         )
 
     def _largest_difference(self, untold: list[int]) -> float | None:
-        spreads = [self.judge.spread(state) for state in untold]
+        spreads = [self.judge.difference(state) for state in untold]
         if not all(number.finite for spread in spreads for number in spread):
             return None
         return max(high.value - low.value for high, low in spreads)

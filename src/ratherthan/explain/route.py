@@ -130,7 +130,7 @@ def route_from(solution: Solution, graph: PolicyGraph, start: int) -> Route:
     if solution.ended[start]:
         return Route(states=(start,), choices=(), outcome=_end_of(solution, start), probability=1.0)
     if _is_risk(solution):
-        return _without_goal(graph, start)
+        return _without_goal(solution, graph, start)
     if not solution.can_arrive[start]:
         reached = np.flatnonzero(reachable_at_all(solution, start))
         return Route(states=(start,), choices=(), outcome="no way", probability=1.0, circle=tuple(map(int, reached)))
@@ -138,7 +138,7 @@ def route_from(solution: Solution, graph: PolicyGraph, start: int) -> Route:
     if (reachable & solution.goal).any():
         states, choices, probability = _most_probable(graph, start, solution.goal, reachable)
         return Route(states=states, choices=choices, outcome="arrives", probability=probability)
-    return _circling(graph, start, reachable)
+    return _circling(solution, graph, start, reachable)
 
 
 def _is_risk(solution: Solution) -> bool:
@@ -162,15 +162,21 @@ def reachable_at_all(solution: Solution, start: int) -> Bools:
     return seen
 
 
-def _without_goal(graph: PolicyGraph, start: int) -> Route:
-    """Follow the most probable branch until a state repeats or the objective has ended."""
+def _without_goal(solution: Solution, graph: PolicyGraph, start: int) -> Route:
+    """Follow the most probable branch until a state repeats or the objective has ended; to stay for ever is a step, too."""
     states, probability = [start], 1.0
     choices: list[int] = []
     seen = {start}
     while len(choices) < MOST_STEPS:
         edges = graph.edges_of(states[-1])
         if not edges:
-            break
+            stay = _stay(solution, states[-1])
+            return Route(
+                states=(*states, *states[-1:] * len(stay)),
+                choices=(*choices, *stay),
+                outcome="open end",
+                probability=probability,
+            )
         best = max(float(graph.probability[e]) for e in edges)
         edge = next(e for e in edges if graph.probability[e] >= best * (1 - TIE))
         states.append(int(graph.target[edge]))
@@ -182,12 +188,22 @@ def _without_goal(graph: PolicyGraph, start: int) -> Route:
     return Route(states=tuple(states), choices=tuple(choices), outcome="open end", probability=probability)
 
 
-def _circling(graph: PolicyGraph, start: int, reachable: Bools) -> Route:
+def _stay(solution: Solution, state: int) -> tuple[int, ...]:
+    """Return the choice with which the policy stays in a state for ever; nothing where there is nothing to decide."""
+    mdp = solution.problem.mdp
+    if solution.ended[state] or len(mdp.choices_of(state)) == 1:
+        return ()
+    weights = solution.policy.weights(mdp)
+    taken = [c for c in mdp.choices_of(state) if weights[c] > 0]
+    return (max(taken, key=lambda c: (float(weights[c]), -c)),) if taken else ()
+
+
+def _circling(solution: Solution, graph: PolicyGraph, start: int, reachable: Bools) -> Route:
     """Return the most probable way into a set of states that the policy cannot leave, once round it, and that set."""
     component, closed = _closed_components(graph, reachable)
     states, choices, probability = _most_probable(graph, start, closed, reachable)
     circle = np.flatnonzero(component == component[states[-1]])
-    round_states, round_choices = _once_round(graph, states[-1])
+    round_states, round_choices = _once_round(solution, graph, states[-1])
     return Route(
         states=states + round_states[1:],
         choices=choices + round_choices,
@@ -214,14 +230,15 @@ def _closed_components(graph: PolicyGraph, reachable: Bools) -> tuple[Array, Boo
     return np.asarray(component, dtype=np.int64), closed
 
 
-def _once_round(graph: PolicyGraph, start: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Follow the most probable branch from `start` until a state repeats."""
+def _once_round(solution: Solution, graph: PolicyGraph, start: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Follow the most probable branch from `start` until a state repeats; to stay for ever is a round, too."""
     states = [start]
     choices: list[int] = []
     while states[-1] not in states[:-1] and len(choices) < MOST_STEPS:
         edges = graph.edges_of(states[-1])
         if not edges:
-            break
+            stay = _stay(solution, states[-1])
+            return (*states, *states[-1:] * len(stay)), (*choices, *stay)
         edge = max(edges, key=lambda e: (float(graph.probability[e]), -e))
         states.append(int(graph.target[edge]))
         choices.append(int(graph.choice[edge]))
@@ -236,18 +253,26 @@ def _most_probable(
     distance = _distances(graph, length, goals, reachable)
     states, choices, total = [start], [], 0.0
     while not goals[states[-1]]:
-        here = states[-1]
-        edges = graph.edges_of(here)
-        edge = next(
-            e
-            for e in edges
-            if length[e] + distance[graph.target[e]] <= distance[here] + TIE
-            and (distance[graph.target[e]] < distance[here] or len(edges) == 1)
-        )
+        edge = _next_edge(graph, length, distance, states)
         states.append(int(graph.target[edge]))
         choices.append(int(graph.choice[edge]))
         total += float(length[edge])
     return tuple(states), tuple(choices), math.exp(-total)
+
+
+def _next_edge(graph: PolicyGraph, length: Floats, distance: Floats, states: list[int]) -> int:
+    """Return the first edge that keeps to the shortest length and comes nearer.
+
+    Where lengths vanish in rounding none may come nearer; then the first that keeps to it and was not visited is taken.
+    """
+    here = states[-1]
+    edges = graph.edges_of(here)
+    total = {e: float(length[e] + distance[graph.target[e]]) for e in edges}
+    keeping = [e for e in edges if total[e] <= distance[here] + TIE]
+    nearer = (e for e in keeping if distance[graph.target[e]] < distance[here] or len(edges) == 1)
+    visited = set(states)
+    fresh = [e for e in edges if int(graph.target[e]) not in visited]
+    return next(nearer, next((e for e in keeping if e in fresh), min(fresh or edges, key=total.__getitem__)))
 
 
 def _distances(graph: PolicyGraph, length: Floats, goals: Bools, reachable: Bools) -> Floats:

@@ -30,17 +30,18 @@ def tree_weight(
     possible: Counts,
     room: tuple[Counts, Counts, int],
     horizon: int,
-    better: Floats,
+    nearer_target: Floats,
+    nearer_origin: Floats,
 ) -> Weight:
     """Search breadth first from the branches `own` of a choice of `root`, never entering `root`.
 
     `rows` are state_to_choices, choice_to_branches and branch_to_target; `room` is a mark per state, a queue for all states
-    and the stamp of this search. A negative `horizon` is without end; with `better` not empty, only branches to smaller
-    numbers are followed.
+    and the stamp of this search. A negative `horizon` is without end; where `nearer_target` is not
+    empty, only branches from s to t with nearer_target[t] < nearer_origin[s] are followed.
     """
     state_to_choices, choice_to_branches, branch_to_target = rows
     mark, queue, stamp = room
-    toward = len(better) > 0
+    toward = len(nearer_target) > 0
     lower, upper = 0, 0
     filled, head = 0, 0
     mark[root] = stamp
@@ -65,7 +66,7 @@ def tree_weight(
             continue
         for b in range(choice_to_branches[state_to_choices[s]], choice_to_branches[state_to_choices[s + 1]]):
             t = branch_to_target[b]
-            if mark[t] != stamp and not (toward and better[t] >= better[s]):
+            if mark[t] != stamp and not (toward and nearer_target[t] >= nearer_origin[s]):
                 mark[t] = stamp
                 queue[filled] = t
                 filled += 1

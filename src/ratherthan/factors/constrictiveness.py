@@ -17,16 +17,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ratherthan.factors._kernels import tree_weight
+from ratherthan.factors.compare import TOLERANCE
 from ratherthan.factors.selectiveness import Criticality
 from ratherthan.model._kernels import compiled
 from ratherthan.model.mdp import MDP, Bools, Floats
 
-__all__ = ["Constrictiveness", "Search", "constrictiveness", "search_tree"]
+__all__ = ["Constrictiveness", "Nearer", "Search", "constrictiveness", "nearer_goal", "search_tree"]
 
 States = npt.NDArray[np.int64]
 
@@ -45,6 +47,29 @@ class Search:
 
     horizon: int | None = None
     toward_goal: bool = False
+
+
+class Nearer(NamedTuple):
+    """Which branches a search toward the goal follows: those with target[t] < origin[s], ``[S]`` each."""
+
+    target: Floats
+    origin: Floats
+
+
+def nearer_goal(lower: Floats, upper: Floats, *, maximise: bool, tolerance: float = TOLERANCE) -> tuple[Nearer, Nearer]:
+    """Return which branches lead to strictly better values for sure, and which may, from bounds of the values.
+
+    Parameters
+    ----------
+    lower, upper : array of float, ``[S]``
+    maximise : bool
+    tolerance : float
+        Values are different, not equal, beyond the factor of τ.
+    """
+    finite = np.where(np.isfinite(upper), np.abs(upper), 0.0), np.where(np.isfinite(lower), np.abs(lower), 0.0)
+    if maximise:  # better is larger
+        return Nearer(tolerance * finite[0] - lower, -upper), Nearer(tolerance * finite[1] - upper, -lower)
+    return Nearer(upper, lower - tolerance * finite[0]), Nearer(lower, upper - tolerance * finite[1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +92,7 @@ def constrictiveness(
     choices: Iterable[int],
     *,
     search: Search = Search(),
-    better: Floats | None = None,
+    nearer: tuple[Nearer, Nearer] | None = None,
 ) -> dict[int, Constrictiveness]:
     """Count the decisions that each of `choices` leaves open.
 
@@ -79,8 +104,8 @@ def constrictiveness(
     ended : array of bool, ``[S]``
     choices : iterable of int
     search : Search
-    better : array of float, ``[S]``, optional
-        Needed for ``Search(toward_goal=True)``: a number per state that falls on the way to better values.
+    nearer : pair of Nearer, optional
+        Needed for ``Search(toward_goal=True)``: which branches lead to better values for sure, and which may.
 
     Returns
     -------
@@ -91,14 +116,32 @@ def constrictiveness(
     rows = mdp.state_to_choices, mdp.choice_to_branches, mdp.branch_to_target
     mark, queue = np.zeros(mdp.states, dtype=np.int64), np.zeros(mdp.states, dtype=np.int64)
     horizon = -1 if search.horizon is None else search.horizon
-    values = better if search.toward_goal and better is not None else np.zeros(0)
+    everywhere = Nearer(np.zeros(0), np.zeros(0))
+    sure, maybe = nearer if search.toward_goal and nearer is not None else (everywhere, everywhere)
     kernel = compiled(tree_weight, mdp.branches)
     counts = {}
-    for stamp, choice in enumerate(choices, start=1):
+    stamp = 0
+    for choice in choices:
         branches = mdp.branches_of(choice)
-        own, room = (branches.start, branches.stop), (mark, queue, stamp)
-        found = kernel(mdp.state_of(choice), own, rows, ended, certain, possible, room, horizon, values)
-        counts[choice] = Constrictiveness(lower=int(found.certain), upper=int(found.possible))
+        own, found = (branches.start, branches.stop), []
+        for follow in (sure,) if sure is maybe else (sure, maybe):
+            stamp += 1
+            room = mark, queue, stamp
+            found.append(
+                kernel(
+                    mdp.state_of(choice),
+                    own,
+                    rows,
+                    ended,
+                    certain,
+                    possible,
+                    room,
+                    horizon,
+                    follow.target,
+                    follow.origin,
+                )
+            )
+        counts[choice] = Constrictiveness(lower=int(found[0].certain), upper=int(found[-1].possible))
     return counts
 
 
@@ -108,7 +151,7 @@ def search_tree(
     choice: int,
     *,
     search: Search = Search(),
-    better: Floats | None = None,
+    nearer: Nearer | None = None,
 ) -> States:
     """Return the states of T(s,a) in breadth-first order, each once.
 
@@ -122,8 +165,8 @@ def search_tree(
     steps = 0
     while len(frontier) and (search.horizon is None or steps < search.horizon):
         origin, target = _branches_from(mdp, frontier[~ended[frontier]])
-        if search.toward_goal and better is not None:
-            target = target[better[target] < better[origin]]
+        if search.toward_goal and nearer is not None:
+            target = target[nearer.target[target] < nearer.origin[origin]]
         frontier = _fresh(target, seen)
         layers.append(frontier)
         steps += 1

@@ -71,9 +71,9 @@ def _clause_key(words: Vocabulary, claim: Claim, own: Measured, foil: Measured) 
         lost = nothing and words.explanation.objective.kind in ("probability", "safety")
         return ("equal_lost" if lost else "equal") + step
     if claim.claim == "worse":
-        return {None: "worse" + step, "dead end": "worse_dead", "may fail": "worse_fail"}[own.fate]
+        return {None: "worse", "dead end": "worse_dead", "may fail": "worse_fail"}[own.fate] + step
     if foil.fate is not None:
-        return {"dead end": "foil_dead", "may fail": "foil_fail"}[foil.fate]
+        return {"dead end": "foil_dead", "may fail": "foil_fail" + step}[foil.fate]
     if step:
         return "better_step"
     kept = all(

@@ -13,6 +13,7 @@ from ratherthan.model.lexicon import Lexicon
 from ratherthan.narrate.contrast import contrast_reason
 from ratherthan.narrate.numbers import at_most, contrasted, percent, plain
 from ratherthan.narrate.words import Vocabulary, vocabulary
+from ratherthan.solve.solution import Outcome
 
 __all__ = ["narrate"]
 
@@ -51,7 +52,13 @@ def _state_text(words: Vocabulary) -> str:
             reason=contrast_reason(words, step),
             **_parts(words, step),
         )
-    return _sentence(words, "alone", step)
+    return " ".join([_sentence(words, "alone", step), *_unproved(words)])
+
+
+def _unproved(words: Vocabulary) -> list[str]:
+    """Return the warning that belongs to values without a proof."""
+    proved = words.explanation.outcome in ("", Outcome.CERTIFIED.value)
+    return [] if proved else [words.table("route")["unproved"]]
 
 
 def _end(words: Vocabulary) -> str:
@@ -66,7 +73,7 @@ def _route_text(words: Vocabulary) -> str:
         return _end(words)
     if explanation.route_outcome == "no way":
         return _no_way(words)
-    if not explanation.steps:
+    if not explanation.steps:  # a policy that says nothing where it starts
         return str(words.table("route")["remain"].format(place=words.place(explanation.start)))
     selective = "selectiveness" in explanation.question.factors
     told = [step for step in explanation.steps if not selective or step.critical is not False]
@@ -75,7 +82,9 @@ def _route_text(words: Vocabulary) -> str:
         sentences += _closing(words, told)
     if explanation.route_outcome == "circles":
         sentences.append(_circle(words))
-    return " ".join(sentences + _chances(words))
+    if explanation.route_outcome == "open end" and explanation.route[-2:] == explanation.route[-1:] * 2:
+        sentences.append(words.table("route")["remain"].format(place=words.place(explanation.route[-1])))
+    return " ".join(sentences + _chances(words) + _unproved(words))
 
 
 def _told(words: Vocabulary, steps: Sequence[Step], *, selective: bool) -> list[str]:
@@ -154,15 +163,25 @@ def _alternatives(words: Vocabulary, claim: Claim) -> dict[str, str]:
     numbers, own = words.table("numbers"), _measured(claim.evidence.taken).number.value
     values = [_measured(other).number.value for other in claim.evidence.others]
     chance = words.explanation.objective.kind != "cost"
-    pair = contrasted(own, values, numbers, chance=chance)
-    listed = words.language.joined(list(dict.fromkeys(pair[1])), "or") if pair else ""
     return {
         "others": words.alternatives(claim.against),
-        "numbers": numbers["pair"].format(better=listed, own=pair[0]) if pair else numbers["close"],
+        "numbers": _pair(words, own, values),
         "values": numbers["values"].format(
             better=words.language.joined([plain(value, numbers, chance=chance) for value in values], "or")
         ),
     }
+
+
+def _pair(words: Vocabulary, own: float, values: Sequence[float]) -> str:
+    """Return better numbers beside the own: all of them, the best where others look like the own, or that it is close."""
+    numbers, objective = words.table("numbers"), words.explanation.objective
+    chance = objective.kind != "cost"
+    pair = contrasted(own, values, numbers, chance=chance)
+    if pair:
+        listed = words.language.joined(list(dict.fromkeys(pair[1])), "or")
+        return str(numbers["pair"].format(better=listed, own=pair[0]))
+    pair = contrasted(own, [max(values) if objective.maximise else min(values)], numbers, chance=chance)
+    return str(numbers["best"].format(better=pair[1][0], own=pair[0]) if pair else numbers["close"])
 
 
 def _details(words: Vocabulary, step: Step) -> str:
@@ -174,7 +193,8 @@ def _details(words: Vocabulary, step: Step) -> str:
         if claim.claim == "only way on":
             parts.append(details["only_way"])
         if claim.claim == "avoids":
-            for fate, key in (("dead end", "dead_end"), ("may fail", "may_fail")):
+            step_only = "_step" if words.explanation.question.policy_values else ""
+            for fate, key in (("dead end", "dead_end"), ("may fail", "may_fail" + step_only)):
                 actions = [row.action for row in claim.evidence.others if _measured(row).fate == fate]
                 if actions:
                     parts.append(details[key].format(others=words.alternatives(actions)))
@@ -186,8 +206,9 @@ def _closing(words: Vocabulary, told: Sequence[Step]) -> list[str]:
     route, closing, asked = words.table("route"), words.explanation.closing, words.explanation.question
     noun, sentences = words.objective["noun"], []
     if not told:
-        key = "no_decision_by" if asked.alpha > 0 and closing.largest_difference != 0.0 else "no_decision"
-        sentences.append(route[key].format(noun=noun, alpha=f"{asked.alpha:g}"))
+        most = _largest_untold(words)
+        key = "no_decision_after" if asked.omega and most else "no_decision_by" if most else "no_decision"
+        sentences.append(route[key].format(noun=noun, largest=at_most(most)))
     elif closing.printed:
         key = "equivalent" if closing.largest_difference == 0.0 else "at_most"
         largest = "" if closing.largest_difference is None else at_most(closing.largest_difference)
@@ -205,6 +226,17 @@ def _closing(words: Vocabulary, told: Sequence[Step]) -> list[str]:
         key = "off_route_one" if closing.off_route == 1 else "off_route_many"
         sentences.append(route[key].format(count=closing.off_route))
     return sentences
+
+
+def _largest_untold(words: Vocabulary) -> float:
+    """Return the largest difference that an untold decision makes; 0 where they are equal, or all without end."""
+    closing, asked = words.explanation.closing, words.explanation.question
+    if closing.largest_difference is not None:
+        return closing.largest_difference
+    if asked.alpha == 0.0 and not asked.omega:
+        return 0.0
+    spreads = [step.spread for step in words.explanation.steps if step.critical is False and step.spread is not None]
+    return max((high.value - low.value for high, low in spreads if high.finite and low.finite), default=0.0)
 
 
 def _unsure(words: Vocabulary) -> list[int]:

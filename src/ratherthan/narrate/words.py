@@ -123,6 +123,8 @@ MOST_VARIABLES = 6
 
 def _phrase_of(name: str) -> str:
     variables = name.count("=")
+    if name.strip("+-. ").isdigit():
+        return "state_variables"  # a name that could be taken for a number stands beside the number
     return "state_name" if not variables else "state_variables" if variables <= MOST_VARIABLES else "state_number"
 
 

@@ -4,17 +4,12 @@ A claim holds if (1) its evidence is of this step and complete: the choice taken
 with, each under its name; (2) every number of the evidence agrees with the model: it lies between its bounds, the true one
 may too, and the bounds are not wider than they need be; (3) the claim follows from the numbers of the evidence; (4) it
 follows from the re-checker's own numbers. If (4) is left open the claim is undecided.
-
-Each claim is a predicate over relations: how the choice taken stands to each alternative ("better", "worse", "equal", "open").
-It is true, false, or None where an open relation decides it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -23,91 +18,27 @@ from ratherthan.explain.question import Question
 from ratherthan.verify.frame import Frame
 from ratherthan.verify.interval import Bounds, Interval, Order, above, order
 from ratherthan.verify.measure import Measures
+from ratherthan.verify.predicates import (
+    ABOUT_COUNTS,
+    CONTRAST,
+    COUNTED,
+    FLEXIBLE,
+    FLEXIBLE_CONTRAST,
+    IMPOSSIBLE,
+    OPTIMAL,
+    PREDICATES,
+    STEPWISE,
+    WITH_SUCCESSORS,
+    Decision,
+    Seen,
+)
 from ratherthan.verify.values import Band
 from ratherthan.verify.verdict import Check, Verdict
 
 __all__ = ["StepCheck"]
 
-Relations = Mapping[int, str]
-Decision = bool | None
-
-OPTIMAL = ("best", "among the best", "right start only", "not best", "hopeless", "avoids", "only way on")
-STEPWISE = ("better step", "equal step", "worse step", "hopeless", "avoids", "only way on")
-FLEXIBLE = ("most flexible", "equally flexible")
-CONTRAST = ("better", "worse", "equal")
-FLEXIBLE_CONTRAST = ("more flexible", "less flexible", "as flexible")
-ABOUT_COUNTS = FLEXIBLE + FLEXIBLE_CONTRAST
-WITH_SUCCESSORS = ("best", "among the best", "right start only", "better")
-
-
-def _all(decisions: Sequence[Decision]) -> Decision:
-    return False if False in decisions else None if None in decisions else True
-
-
-def _any(decisions: Sequence[Decision]) -> Decision:
-    return True if True in decisions else None if None in decisions else False
-
-
-def _is(relation: str, *wanted: str) -> Decision:
-    return None if relation == "open" else relation in wanted
-
-
-class _Seen(NamedTuple):
-    """What a claim is judged by: the relations to the alternatives, the infinite rows, ρ^π against ρ at the successors."""
-
-    relations: Relations
-    fates: Mapping[int, str | None]
-    numbers: Sequence[Interval]
-    own: Interval
-    own_fate: str | None
-    keeps: Sequence[Decision]
-
-
-def _top(seen: _Seen) -> Decision:
-    return _all([_is(relation, "better", "equal") for relation in seen.relations.values()])
-
-
-def _alone(seen: _Seen) -> Decision:
-    return _all([_is(relation, "better") for relation in seen.relations.values()])
-
-
-def _shared(seen: _Seen) -> Decision:
-    return _all([_top(seen), _any([_is(relation, "equal") for relation in seen.relations.values()])])
-
-
-def _certainly_finite(number: Interval) -> bool:
-    return math.isfinite(number.lower) and math.isfinite(number.upper)
-
-
-PREDICATES: dict[str, Callable[[_Seen], Decision]] = {
-    "best": lambda seen: _all([_alone(seen), *seen.keeps]),
-    "among the best": lambda seen: _all([_shared(seen), *seen.keeps]),
-    "right start only": lambda seen: _all([_top(seen), _any([None if k is None else not k for k in seen.keeps])]),
-    "not best": lambda seen: _all([_is(relation, "worse") for relation in seen.relations.values()]),
-    "worse step": lambda seen: _all([_is(relation, "worse") for relation in seen.relations.values()]),
-    "better step": _alone,
-    "equal step": _shared,
-    "avoids": lambda seen: _certainly_finite(seen.own) and all(fate is not None for fate in seen.fates.values()),
-    "only way on": lambda _: True,
-    "better": lambda seen: _all([_is(relation, "better") for relation in seen.relations.values()]),
-    "worse": lambda seen: _all([_is(relation, "worse") for relation in seen.relations.values()]),
-    "equal": lambda seen: _all([_is(relation, "equal") for relation in seen.relations.values()]),
-}
-
-COUNTED: dict[str, Callable[[Interval, Interval], bool]] = {
-    "most flexible": lambda own, other: own.lower > other.upper,
-    "more flexible": lambda own, other: own.lower > other.upper,
-    "less flexible": lambda own, other: own.upper < other.lower,
-    "equally flexible": lambda own, other: own.lower == own.upper == other.lower == other.upper,
-    "as flexible": lambda own, other: own.lower == own.upper == other.lower == other.upper,
-}
-IMPOSSIBLE: dict[str, Callable[[Interval, Interval], bool]] = {
-    "most flexible": lambda own, other: own.upper <= other.lower,
-    "more flexible": lambda own, other: own.upper <= other.lower,
-    "less flexible": lambda own, other: own.lower >= other.upper,
-    "equally flexible": lambda own, other: own.upper < other.lower or own.lower > other.upper,
-    "as flexible": lambda own, other: own.upper < other.lower or own.lower > other.upper,
-}
+VAGUE = 1e-6
+"""By which share of a number the bounds known here may reach beyond those of the evidence and still confirm it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -140,11 +71,8 @@ class StepCheck:
         found = [self._check("critical", self._critical(), self._critical_is_open())]
         for claim in self.step.claims:
             flaw = self._evidence(claim)
-            if flaw is None:
-                flaw, is_open = self._decided(claim)
-            else:
-                is_open = False
-            found.append(self._check(claim.claim, flaw, is_open))
+            flaw, is_open = self._decided(claim) if flaw is None else (flaw, False)
+            found.append(self._check(claim.claim, flaw, is_open or self._vague(claim)))
         found.append(self._check("claims", self._together(), is_open=False))
         return found
 
@@ -255,6 +183,14 @@ class StepCheck:
                     return flaw
         return None
 
+    def _vague(self, claim: Claim) -> bool:
+        """Return whether less is known here of some number than the evidence says."""
+        rows = [row for row in (claim.evidence.taken, *claim.evidence.others) if isinstance(row, Measured)]
+        pairs = [(self.measures.number(row.choice), row.number) for row in rows]
+        for state, optimum, followed in claim.evidence.follows:
+            pairs += [(self.best[state], optimum), (self.followed[state], followed)]
+        return any(own.vague(told, VAGUE) for own, told in pairs)
+
     def _tally(self, row: Tally) -> str | None:
         own, admitted = self.measures.count(row.choice)
         if not (row.lower <= row.upper and own.meets(row)):
@@ -309,25 +245,25 @@ class StepCheck:
             return "it does not hold on the model", False
         return None, not all(compare(own, other) for other in rest)
 
-    def _judged(self, claim: Claim, seen: _Seen) -> Decision:
+    def _judged(self, claim: Claim, seen: Seen) -> Decision:
         if claim.claim == "only way on":
             return len(self.frame.mdp.choices_of(self.step.state)) == 1
         if claim.claim == "hopeless":
             return self._hopeless(seen)
-        return bool(seen.relations) and PREDICATES[claim.claim](seen)
+        return PREDICATES[claim.claim](seen) if seen.relations else False
 
-    def _hopeless(self, seen: _Seen) -> Decision:
+    def _hopeless(self, seen: Seen) -> Decision:
         """Return whether no choice is sure to arrive (a least cost), or none can arrive at all (a largest probability)."""
         if self.frame.costs:
             return seen.own_fate is not None and all(fate is not None for fate in seen.fates.values())
         return self.frame.maximise and all(number.lower == number.upper == 0.0 for number in seen.numbers)
 
-    def _as_told(self, claim: Claim) -> _Seen:
+    def _as_told(self, claim: Claim) -> Seen:
         """Return what the evidence says."""
         taken = claim.evidence.taken
         rows = [row for row in claim.evidence.others if isinstance(row, Measured)]
         assert isinstance(taken, Measured)
-        return _Seen(
+        return Seen(
             relations={row.choice: self._relation(taken.number, row.number) for row in rows},
             fates={row.choice: row.fate for row in rows},
             numbers=[taken.number, *(row.number for row in rows)],
@@ -336,12 +272,12 @@ class StepCheck:
             keeps=[self._keeps(optimum, followed) for _, optimum, followed in claim.evidence.follows],
         )
 
-    def _as_known(self, claim: Claim) -> _Seen:
+    def _as_known(self, claim: Claim) -> Seen:
         """Return what the model says."""
         taken, rows = self.step.choice, [row.choice for row in claim.evidence.others]
         own = self.measures.number(taken)
         follows = [state for state, _, _ in claim.evidence.follows]
-        return _Seen(
+        return Seen(
             relations={row: self._relation(own, self.measures.number(row)) for row in rows},
             fates={row: self.measures.fate(row) for row in rows},
             numbers=[own, *(self.measures.number(row) for row in rows)],
@@ -388,7 +324,11 @@ class StepCheck:
             for row in (claim.evidence.taken, *claim.evidence.others):
                 if isinstance(row, Measured) and known.setdefault(row.choice, row.number) != row.number:
                     return f"two numbers are given for '{row.action}'"
-        if self.step.spread is not None and len(known) == len(self.frame.mdp.choices_of(self.step.state)):
+        if (
+            self.step.spread is not None
+            and not self.asked.omega
+            and len(known) == len(self.frame.mdp.choices_of(self.step.state))
+        ):
             high = max(number.upper for number in known.values()), max(number.lower for number in known.values())
             low = min(number.upper for number in known.values()), min(number.lower for number in known.values())
             if [(x.upper, x.lower) for x in self.step.spread] != [high, low]:

@@ -58,7 +58,7 @@ class ClosingCheck:
             return "it must be printed exactly where the largest difference is known and asked for", False
         if False not in equal and None not in equal and self.measures.slack < math.inf:
             return "all other decisions are equivalent", False
-        spreads = [self.measures.spread(state) for state in untold]
+        spreads = [self.measures.difference(state) for state in untold]
         if closing.largest_difference is None:
             known = all(number.finite for spread in spreads for number in spread) and self.measures.slack < math.inf
             return ("the largest difference is known" if known else None), False

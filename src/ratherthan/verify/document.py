@@ -227,6 +227,9 @@ def refuse_foreign(told: Explanation, problem: Problem) -> None:
                 _refuse(f"Choice {choice} must be called '{mdp.action_name(choice)}'", f"'{action}'", state=step.state)
         if step.choice_index != step.choice - own.start:
             _refuse(f"Choice {step.choice} must be number {step.choice - own.start} of its state", step.choice_index)
+        foils = [mdp.action_name(choice) for choice in own if choice != step.choice]
+        if step.foil is not None and step.foil not in foils:
+            _refuse(f"The foil must be another action of state {step.state}, one of {foils}", f"'{step.foil}'")
         if step.foil != told.question.rather_than:
             _refuse(f"The foil must be what was asked about, {told.question.rather_than!r}", repr(step.foil))
 

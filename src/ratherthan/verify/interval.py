@@ -100,8 +100,15 @@ class Bounds:
         """Whether other bounds are no wider than these widened by a share of the number; by ∞, all bounds are covered."""
         if math.isinf(share):
             return True
-        wide = self.widened(share)
-        return wide.lower <= other.lower and other.upper <= wide.upper
+        return self.widened(share).contains(other)
+
+    def vague(self, other: Interval, share: float) -> bool:
+        """Whether these bounds are too wide to confirm the other ones: they reach beyond them by more than a share."""
+        return not Bounds(other.lower, other.upper).widened(share).contains(self)
+
+    def contains(self, other: Interval) -> bool:
+        """Whether other bounds lie between these."""
+        return self.lower <= other.lower and other.upper <= self.upper
 
     def meets(self, other: Interval) -> bool:
         """Whether one number can lie between both pairs of bounds."""

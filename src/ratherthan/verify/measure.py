@@ -61,10 +61,17 @@ class Measures:
 
     @cached_property
     def ends(self) -> tuple[Floats, Floats]:
-        """The lower and upper bounds of all numbers, ``[C]`` each."""
-        return self._ends(self.band.lower, -1.0), self._ends(self.band.upper, 1.0)
+        """The lower and upper bounds of all action values q, ``[C]`` each."""
+        return self._ends(self.band.lower, -1.0, omega=False), self._ends(self.band.upper, 1.0, omega=False)
 
-    def _ends(self, values: Floats, away: float) -> Floats:
+    @cached_property
+    def lambda_ends(self) -> tuple[Floats, Floats]:
+        """The same of what decides λ and criticality: q, or on request ω."""
+        if not self.omega:
+            return self.ends
+        return self._ends(self.band.lower, -1.0, omega=True), self._ends(self.band.upper, 1.0, omega=True)
+
+    def _ends(self, values: Floats, away: float, *, omega: bool) -> Floats:
         mdp = self.frame.mdp
         begin = mdp.choice_to_branches[:-1]
         near = values[mdp.branch_to_target]
@@ -76,7 +83,7 @@ class Measures:
         clip = np.maximum.reduceat(near, begin) if away > 0 else np.minimum.reduceat(near, begin)
         mean = np.minimum(mean, clip) if away > 0 else np.maximum(mean, clip)
         mean = np.where(np.isfinite(mean), mean, 0.0)  # what is infinite is set below
-        if not self.omega:
+        if not omega:
             price = self.frame.price
             mean = mean + price + away * (2 * degree + 12) * ROUNDING * (price + np.where(price > 0, np.abs(mean), 0.0))
         for infinity in (-np.inf, np.inf):  # no value is -∞, that is only a bound: a mean with ∞ in it is ∞
@@ -94,6 +101,12 @@ class Measures:
 
     def spread(self, state: int) -> tuple[Bounds, Bounds]:
         """Return λmax and λmin of a state."""
+        lower, upper = self.lambda_ends
+        numbers = [Bounds(float(lower[c]), float(upper[c])) for c in self.frame.mdp.choices_of(state)]
+        return largest(numbers), smallest(numbers)
+
+    def difference(self, state: int) -> tuple[Bounds, Bounds]:
+        """Return the largest and the smallest action value of a state."""
         numbers = self.numbers(state).values()
         return largest(numbers), smallest(numbers)
 
@@ -107,7 +120,7 @@ class Measures:
     @cached_property
     def critical(self) -> tuple[Bools, Bools]:
         """Which states are critical for sure, and which may be, ``[S]`` each."""
-        return self._critical(*self.ends)
+        return self._critical(*self.lambda_ends)
 
     @cached_property
     def admitted(self) -> tuple[Bools, Bools]:
@@ -115,8 +128,8 @@ class Measures:
         several = (np.diff(self.frame.mdp.state_to_choices) > 1) & self.frame.running
         if np.isinf(self.slack):
             return np.zeros_like(several), several
-        lower, upper = self.ends
-        finite_lower, finite_upper = (np.where(np.isfinite(end), np.abs(end), 0.0) for end in self.ends)
+        lower, upper = self.lambda_ends
+        finite_lower, finite_upper = (np.where(np.isfinite(end), np.abs(end), 0.0) for end in self.lambda_ends)
         return self._critical(lower - self.slack * finite_lower, upper + self.slack * finite_upper)
 
     def _critical(self, lower: Floats, upper: Floats) -> tuple[Bools, Bools]:
@@ -198,4 +211,12 @@ class Measures:
         lower, upper = self.band.lower, self.band.upper
         first, second = (target, origin) if self.frame.maximise else (origin, target)
         more, less = order_all((lower[first], upper[first]), (lower[second], upper[second]), self.tolerance)
-        return more if sure else ~less
+        return more if sure else ~less & ~self._equal(origin, target)
+
+    def _equal(self, one: Array, other: Array) -> Bools:
+        """Return which pairs of states have values that are certainly equal."""
+        lower, upper = self.band.lower, self.band.upper
+        with np.errstate(invalid="ignore"):
+            apart = np.maximum(upper[one] - lower[other], upper[other] - lower[one])
+        least = self.tolerance * np.maximum(lower[one], lower[other])
+        return np.where(np.isfinite(apart), apart <= np.maximum(least, 0.0), lower[one] == lower[other])

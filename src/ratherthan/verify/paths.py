@@ -7,7 +7,6 @@ that the most probable way is the shortest; shortest lengths are relaxed over al
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,11 +23,12 @@ TIE = 1e-12
 
 @dataclass(frozen=True)
 class Edge:
-    """One move: by which choice, where to, how probable."""
+    """One move: by which choice, where to, how probable, and how probable before staying in place was left out."""
 
     choice: int
     target: int
     chance: float
+    part: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,7 +40,8 @@ class Moves:
     first : array of int, ``[S+1]``
         Where the moves of each state begin; ended states have none.
     origin, target, choice : array of int, ``[E]``
-    chance : array of float, ``[E]``
+    chance, part : array of float, ``[E]``
+        The probability of each move with and without renormalising.
     """
 
     first: Array  # [S+1]
@@ -48,11 +49,12 @@ class Moves:
     target: Array  # [E]
     choice: Array  # [E]
     chance: Floats  # [E]
+    part: Floats  # [E]
 
     def of(self, state: int) -> list[Edge]:
         """Return the moves of one state."""
         return [
-            Edge(int(self.choice[e]), int(self.target[e]), float(self.chance[e]))
+            Edge(int(self.choice[e]), int(self.target[e]), float(self.chance[e]), float(self.part[e]))
             for e in range(int(self.first[state]), int(self.first[state + 1]))
         ]
 
@@ -127,9 +129,5 @@ def moves_of(frame: Frame, weight: Floats) -> Moves:
         target=target,
         choice=choice,
         chance=part / total[origin],
+        part=part,
     )
-
-
-def log_chance(chances: list[float]) -> float:
-    """Return the log-probability of a sequence of moves."""
-    return math.fsum(math.log(chance) if chance > 0 else -math.inf for chance in chances)

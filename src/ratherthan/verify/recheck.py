@@ -27,7 +27,7 @@ Compared with the model, each with a verdict:
 ``closing``                     printed, largest_difference, off_route, off_route_open
 ==============================  =====================================================================================
 
-Not compared: ``source``, which is only where the model came from; words of the ``lexicon`` that the text does not use; fields that
+Left undecided: words that are not the model's own. Not compared: ``source``, which is only where the model came from; words of the ``lexicon`` that the text does not use; fields that
 do not matter to the question, such as ``alpha`` where no critical state is spoken of. What the explanation leaves unsaid is
 no fault of it, but an alternative or a detail that it must name is.
 
@@ -47,6 +47,7 @@ from typing import Any
 import numpy as np
 
 from ratherthan.explain.explanation import Explanation
+from ratherthan.model.lexicon import Lexicon
 from ratherthan.model.objective import Objective
 from ratherthan.model.problem import Problem
 from ratherthan.verify.candidates import Budget
@@ -109,17 +110,23 @@ class _Recheck:
     frame: Frame
     initial: frozenset[int]
     budget: Budget
+    lexicon: Lexicon
 
     @staticmethod
     def of(told: Explanation, problem: Problem, wanted: Objective, budget: Budget) -> _Recheck:
         """Set the re-check of an explanation up."""
         frame, initial = frame_of(problem, wanted), frozenset(map(int, problem.mdp.initial))
-        return _Recheck(told=told, frame=frame, initial=initial, budget=budget)
+        return _Recheck(told=told, frame=frame, initial=initial, budget=budget, lexicon=problem.lexicon)
 
     def checks(self) -> list[Check]:
         """Return all checks in the order of the document."""
         told = self.told
-        found = [self._check("model", None), self._check("start", self._start()), self.policy.entries()]
+        found = [
+            self._check("model", None),
+            self._words(),
+            self._check("start", self._start()),
+            self.policy.entries(),
+        ]
         if found[-1].verdict is Verdict.FAILS:
             return found
         if not told.policy.given:
@@ -201,6 +208,13 @@ class _Recheck:
         if self.frame.risk and self.frame.running[self.told.start]:
             return None
         return arriving(self.frame, self.policy.weight, self.budget)
+
+    def _words(self) -> Check:
+        """Check the words: what others than the model's own mean cannot be decided."""
+        if self.told.lexicon == self.lexicon:
+            return Check(what="words", where="", verdict=Verdict.HOLDS)
+        reason = "they are not the model's own; where they were given with a lexicon, give the same one here"
+        return Check(what="words", where="", verdict=Verdict.UNDECIDED, reason=reason)
 
     def _start(self) -> str | None:
         told = self.told

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,8 @@ __all__ = ["RouteCheck"]
 
 MOST_STEPS = 1000
 MOST_NAMED = 20
+VAGUE = 1e-6
+"""By which share of a number the bounds known here may reach beyond those of the explanation and still confirm it."""
 NEAR = 1e-9
 """How far the probability of a route may be from its product: a thousand factors, rounded one by one."""
 
@@ -80,6 +82,8 @@ class RouteCheck:
         for step, target in zip(told.steps, told.route[1:], strict=True):
             if not self.frame.running[step.state]:
                 return f"it goes on from state {step.state}, where the objective has ended"
+            if step.state == target and not self.moves.of(target):
+                continue  # it stays there for ever; that it takes this choice is checked with the step
             if self.moves.move(step.state, step.choice, target) == 0.0:
                 return f"'{step.action}' at state {step.state} does not lead to state {target} under the policy"
         expected = self._outcome()
@@ -107,7 +111,7 @@ class RouteCheck:
     def _chances(self) -> list[float]:
         told = self.explanation
         return [
-            self.moves.move(step.state, step.choice, target)
+            1.0 if step.state == target else self.moves.move(step.state, step.choice, target)
             for step, target in zip(told.steps, told.route[1:], strict=True)
         ]
 
@@ -117,7 +121,7 @@ class RouteCheck:
         if told.route_outcome == "circles":
             chances = chances[: self._entry()]
         product = min(1.0, math.prod(chances))
-        if told.route_probability is None or abs(told.route_probability - product) > NEAR * product:
+        if told.route_probability is None or abs(told.route_probability - product) > NEAR * product + 1e-300:
             return f"it is {product:.10g}, got {told.route_probability}"
         return None
 
@@ -177,22 +181,30 @@ class RouteCheck:
         told = self.explanation
         seen = {told.route[begin]}
         for i in range(begin, len(told.steps)):
-            state, target = told.route[i], told.route[i + 1]
-            problem = self._likeliest(i)
+            target = told.route[i + 1]
+            stays = target == told.steps[i].state and not self.moves.of(target)
+            problem = None if stays else self._likeliest(i)
             if problem:
                 return problem
             if target in seen and i + 1 < len(told.steps):
                 return f"it must stop where state {target} repeats"
             seen.add(target)
-            del state
         last = told.route[-1]
-        complete = last in told.route[begin:-1] or not self.moves.of(last) or len(told.steps) - begin >= MOST_STEPS
+        alone = len(self.frame.mdp.choices_of(last)) == 1
+        unsaid = all(state != last for state, _, _ in told.policy.choices)
+        silent = not self.moves.of(last) and (alone or unsaid or not self.frame.running[last])
+        complete = last in told.route[begin:-1] or silent or len(told.steps) - begin >= MOST_STEPS
         return None if complete else f"it must go on from state {last} until a state repeats"
+
+    def _open_end(self) -> str | None:
+        return self._round(0)
 
     def _likeliest(self, i: int) -> str | None:
         """Return what is wrong with move number i as the most probable one of its state."""
         step, target = self.explanation.steps[i], self.explanation.route[i + 1]
         edges = self.moves.of(step.state)
+        if not edges:
+            return f"from state {step.state} nothing leads to state {target}"
         best = max(e.chance for e in edges)
         taken = next(
             (
@@ -204,12 +216,9 @@ class RouteCheck:
         )
         if taken is None:
             return f"from state {step.state} there is a more probable move than to state {target}"
-        if any(e.chance == best for e in edges[:taken]):
+        if any(e.part >= max(edge.part for edge in edges) for e in edges[:taken]):
             return f"at state {step.state} an equally probable move is listed before that to state {target}"
         return None
-
-    def _open_end(self) -> str | None:
-        return self._round(0)
 
     def _no_way(self) -> str | None:
         told, frame = self.explanation, self.frame
@@ -227,17 +236,19 @@ class RouteCheck:
             agree = (told.arrival is None) == (self.arrival is None)
             return self._check("arrival_probability", None if agree else "it is given exactly where there is a goal")
         own, claimed = self.arrival[told.start], told.arrival
-        silent = own.lower == -math.inf and not claimed.lower <= 0.0 < 1.0 <= claimed.upper
-        if silent:
-            flaw = "it is not known: the policy that is listed says nothing of a state it comes to"
-            return self._check("arrival_probability", flaw)
         if not claimed.lower <= claimed.value <= claimed.upper:
             return self._check("arrival_probability", "it must lie between its bounds")
+        if (claimed.lower, claimed.upper) == (0.0, 1.0):  # it is said that nothing is known
+            return self._check("arrival_probability", None)
+        if own.lower == -math.inf:
+            flaw = "it is not known: the policy that is listed says nothing of a state it comes to"
+            return self._check("arrival_probability", flaw)
         if not (own.meets(claimed) and own.covers(claimed, self.slack)):
             truth = f"it lies between {own.lower:.10g} and {own.upper:.10g}"
             flaw = f"{truth}, got {claimed.lower:.10g} to {claimed.upper:.10g}"
             return self._check("arrival_probability", flaw)
-        return self._check("arrival_probability", None)
+        found = self._check("arrival_probability", None)
+        return replace(found, verdict=Verdict.UNDECIDED) if own.vague(claimed, VAGUE) else found
 
 
 def _hazards_in_the_way(frame: Frame, start: int, told: tuple[int, ...]) -> str | None:
