@@ -27,8 +27,9 @@ Compared with the model, each with a verdict:
 ``closing``                     printed, largest_difference, off_route, off_route_open
 ==============================  =====================================================================================
 
-Left undecided: words that are not the model's own. Not compared: ``source``, which is only where the model came from; words of the ``lexicon`` that the text does not use; fields that
-do not matter to the question, such as ``alpha`` where no critical state is spoken of. What the explanation leaves unsaid is
+Left undecided: words that are not the model's own, unless the same lexicon is given. Not compared: ``source``, which is only
+where the model came from, and fields that do not matter to the question, such as ``alpha`` where no critical state is spoken
+of. What the explanation leaves unsaid is
 no fault of it, but an alternative or a detail that it must name is.
 
 Nothing of the code that made the explanation is used: values are bounded by exact policy iteration or by sweeps (`values`),
