@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
-__all__ = ["Command", "Option", "Wanted", "argument", "option", "output_options", "source_options"]
+__all__ = ["Command", "Option", "Wanted", "argument", "measure_options", "option", "output_options", "source_options"]
 
 SECTIONS = ("Arguments", "Question", "Policy", "Source", "Output", "Other")
 F = TypeVar("F", bound=Callable[..., Any])
@@ -139,6 +139,58 @@ def source_options(*keys: str) -> Callable[[F], Callable[..., Any]]:
         )(decorated)
 
     return decorate
+
+
+def measure_options(command: F) -> F:
+    """Decorate a command with how decisions are measured, and with the policy that is judged."""
+    for add in reversed(_MEASURES):
+        command = add(command)
+    return command
+
+
+_MEASURES: tuple[Callable[[F], F], ...] = (
+    option(
+        "--alpha",
+        section="Question",
+        type=float,
+        default=0.0,
+        help="Decisions that change no more than this do not matter.",
+    ),
+    option(
+        "--impact",
+        section="Question",
+        type=click.Choice(("action-value", "omega")),
+        default="action-value",
+        help="What makes a state critical: the cost of a step and all that follows, or what follows alone (the paper's).",
+    ),
+    option(
+        "--values",
+        section="Question",
+        type=click.Choice(("optimum", "policy")),
+        default="optimum",
+        help="What follows a step: the best plan, or the one of --policy.",
+    ),
+    option(
+        "--horizon",
+        section="Question",
+        type=click.IntRange(min=0),
+        metavar="H",
+        help="Look so many steps ahead for choices.",
+    ),
+    option(
+        "--toward",
+        section="Question",
+        type=click.Choice(("goal",)),
+        help="Look for choices only on the way to better states.",
+    ),
+    option(
+        "--policy",
+        section="Policy",
+        metavar="FILE",
+        help="Take this policy (JSON, CSV, .npy, or an export of Storm or PRISM), not the best one.",
+    ),
+    option("--minimise-q", section="Policy", is_flag=True, help="In a Q table the smallest number is taken."),
+)
 
 
 def output_options(*formats: str) -> Callable[[F], F]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ratherthan.apps.options import Command, Wanted, option, output_options, source_options
+from ratherthan.apps.options import Command, Wanted, measure_options, option, output_options, source_options
 
 EXAMPLES = (
     "ratherthan explain example:paper-5x5",
@@ -46,48 +46,8 @@ FORMS = ("text", "json")
     help="Where: a number from 0, or an exact name.  [default: the initial state]",
 )
 @option("--rather-than", section="Question", metavar="ACTION", help="Why not this action, at the one state?")
-@option(
-    "--alpha",
-    section="Question",
-    type=float,
-    default=0.0,
-    help="Decisions that change no more than this do not matter.",
-)
-@option(
-    "--impact",
-    section="Question",
-    type=click.Choice(("action-value", "omega")),
-    default="action-value",
-    help="What decides: the cost of a step and all that follows, or what follows alone (the paper's).",
-)
-@option(
-    "--values",
-    section="Question",
-    type=click.Choice(("optimum", "policy")),
-    default="optimum",
-    help="What follows a step: the best plan, or the one that is explained.",
-)
-@option(
-    "--horizon",
-    section="Question",
-    type=click.IntRange(min=0),
-    metavar="H",
-    help="Look so many steps ahead for choices.",
-)
-@option(
-    "--toward",
-    section="Question",
-    type=click.Choice(("goal",)),
-    help="Look for choices only on the way to better states.",
-)
 @option("--detail", section="Question", is_flag=True, help="Say also what the other actions would lead to.")
-@option(
-    "--policy",
-    section="Policy",
-    metavar="FILE",
-    help="Explain this policy (JSON, CSV, .npy, or an export of Storm or PRISM), not the best one.",
-)
-@option("--minimise-q", section="Policy", is_flag=True, help="In a Q table the smallest number is taken.")
+@measure_options
 @output_options(*FORMS)
 def command(wanted: Wanted, form: str | None, output: str | None, **given: Any) -> None:
     """Say what the plan of SOURCE does, and why this rather than that."""

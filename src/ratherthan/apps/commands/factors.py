@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from ratherthan.apps.options import Command, Wanted, option, output_options, source_options
+from ratherthan.apps.options import Command, Wanted, measure_options, option, output_options, source_options
 
 EXAMPLES = (
     "ratherthan factors example:paper-5x5",
@@ -30,47 +30,7 @@ FORMS = ("table", "json", "csv", "parquet")
 @option(
     "--state", "states", section="Question", metavar="STATE", multiple=True, help="Count there too; can be repeated."
 )
-@option(
-    "--alpha",
-    section="Question",
-    type=float,
-    default=0.0,
-    help="Decisions that change no more than this do not matter.",
-)
-@option(
-    "--impact",
-    section="Question",
-    type=click.Choice(("action-value", "omega")),
-    default="action-value",
-    help="What makes a state critical: the cost of a step and all that follows, or what follows alone (the paper's).",
-)
-@option(
-    "--values",
-    section="Question",
-    type=click.Choice(("optimum", "policy")),
-    default="optimum",
-    help="What follows a step: the best plan, or the one of --policy.",
-)
-@option(
-    "--horizon",
-    section="Question",
-    type=click.IntRange(min=0),
-    metavar="H",
-    help="Look so many steps ahead for choices.",
-)
-@option(
-    "--toward",
-    section="Question",
-    type=click.Choice(("goal",)),
-    help="Look for choices only on the way to better states.",
-)
-@option(
-    "--policy",
-    section="Policy",
-    metavar="FILE",
-    help="Judge this policy (JSON, CSV, .npy, or an export of Storm or PRISM), not the best one.",
-)
-@option("--minimise-q", section="Policy", is_flag=True, help="In a Q table the smallest number is taken.")
+@measure_options
 @output_options(*FORMS)
 def command(wanted: Wanted, form: str | None, output: str | None, **given: Any) -> None:
     """Print the three factors of every choice of SOURCE."""
