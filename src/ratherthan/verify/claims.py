@@ -341,7 +341,8 @@ class StepCheck:
         if not told or self.step.foil is not None or math.isinf(self.measures.slack):
             return None
         others = [choice for choice in self.frame.mdp.choices_of(self.step.state) if choice != self.step.choice]
-        flexible = "constrictiveness" in self.asked.factors and bool(others)
+        exact = not self.asked.search.toward_goal  # else what is near the goal may be open to one and not to the other
+        flexible = "constrictiveness" in self.asked.factors and bool(others) and exact
         missing = self._flexibility_missing(names, others) if flexible else None
         if missing or "responsibility" not in self.asked.factors or "hopeless" in names:
             return missing
