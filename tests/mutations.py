@@ -68,9 +68,10 @@ def _changes(value: Any) -> Iterator[tuple[str, Any]]:
     elif isinstance(value, int | float):
         yield "more", value + 1
         yield "less", value - 1
-        if isinstance(value, float) and value:
+        if isinstance(value, float) and abs(value) > 1e-6:  # less may be rounding
             yield "a little more", value * 1.01
             yield "a little less", value * 0.99
+        if isinstance(value, float) and value:
             yield "infinite", "inf"
     elif isinstance(value, str):
         yield "renamed", value + " indeed"

@@ -8,9 +8,9 @@ from random import Random
 from typing import Any, NamedTuple
 
 import numpy as np
-from random_models import OBJECTIVES, random_policy, random_problem
+from random_models import LEVELS, MISSIONS, OBJECTIVES, SIGNED, random_policy, random_problem, random_rich_problem
 
-from ratherthan.errors import PolicyError
+from ratherthan.errors import PolicyError, PropertyError
 from ratherthan.explain import KINDS, explain, question
 from ratherthan.explain.question import FACTORS, Question
 from ratherthan.explain.record import to_document
@@ -69,6 +69,50 @@ def random_case(seed: int) -> Case:
         explanation = explain(solution)
     document = to_document(explanation, narrate(explanation))
     return Case(problem, json.loads(json.dumps(document)))
+
+
+RICH = {**SIGNED, **MISSIONS, **LEVELS}
+"""The objectives beyond one cost and one probability."""
+
+ALSO = (
+    'R{"cost"}min=? [F "goal"]',
+    'R{"toll"}min=? [F "goal"]',
+    'R{"gain"}max=? [Fsure "goal"]',
+    'R{"toll + 0.5 * cost"}min=? [F "goal"]',
+    'Pmax=? [!"hazard" U "goal"]',
+    'Pmin=? [F "hazard"]',
+    'R{"gain"}max=? [Cdiscount=0.75]',
+    "toll",
+)
+"""Further objectives."""
+
+
+def random_rich_case(seed: int) -> Case:
+    """Return a case of what else can be wanted: rewards of both signs, discounts, weights, missions, levels, trade-offs."""
+    random = Random(seed)
+    objective = list(RICH.values())[seed % len(RICH)]
+    problem = random_rich_problem(random, objective=objective, most_states=random.choice([4, 6, 8]))
+    solution = _rich_solution(random, problem)
+    also: list[str] = []
+    if random.random() < 0.4:
+        also = random.sample(ALSO, random.choice([1, 1, 2]))
+    asked = random_question(random, solution)
+    try:
+        explanation = explain(solution, asked=asked, also=also)
+    except PolicyError:  # asked about a state of which the policy says nothing
+        explanation = explain(solution)
+    except PropertyError:  # the plan's own objective, or no goal until which a reward could count
+        explanation = explain(solution, asked=asked)
+    return Case(problem, json.loads(json.dumps(to_document(explanation, narrate(explanation)))))
+
+
+def _rich_solution(random: Random, problem: Problem) -> Solution:
+    """Return the optimum, or a random policy for the model or its product against it."""
+    best = solve(problem)
+    if random.random() < 0.5:
+        return best
+    mdp = random.choice([problem, best.problem]).mdp
+    return evaluate(problem, random_policy(random, mdp, randomised=random.random() < 0.4))
 
 
 def _solution(random: Random, problem: Problem) -> Solution:

@@ -7,7 +7,15 @@ from random import Random
 import numpy as np
 
 from ratherthan.model.mdp import MDP, Reward
-from ratherthan.model.objective import ExpectedCost, Objective, ReachAvoid
+from ratherthan.model.objective import (
+    Discounted,
+    ExpectedCost,
+    ExpectedReward,
+    Lexicographic,
+    Mission,
+    Objective,
+    ReachAvoid,
+)
 from ratherthan.model.policy import Policy
 from ratherthan.model.problem import Problem
 
@@ -21,14 +29,70 @@ OBJECTIVES: dict[str, Objective] = {
     "least risk": ReachAvoid(goal=HAZARD, maximise=False),
 }
 
+SIGNED: dict[str, Objective] = {
+    "most reward": ExpectedReward(goal=GOAL, reward="gain"),
+    "least reward": ExpectedReward(goal=GOAL, reward="gain", maximise=False),
+    "most in the long run": Discounted(reward="gain", discount=0.9),
+    "least in the long run": Discounted(reward="gain", discount=0.5, maximise=False),
+    "far sighted": Discounted(reward="gain", discount=0.999),
+    "least weighted cost": ExpectedCost(goal=GOAL, reward="cost + 2.5 * toll"),
+    "most weighted reward": ExpectedReward(goal=GOAL, reward="3 * gain + 0.5 * toll"),
+}
+"""With rewards of both signs, discounts and weights."""
+MISSIONS: dict[str, Objective] = {
+    "in time": Mission(formula=f"F<=3 {GOAL}"),
+    "late": Mission(formula=f"F<=2 {HAZARD}", maximise=False),
+    "in order": Mission(formula=f"F ({HAZARD} & (F {GOAL}))"),
+    "both": Mission(formula=f"(F {HAZARD}) & (F {GOAL})"),
+}
+"""What takes memory."""
+LEVELS: dict[str, Objective] = {
+    "safest, then cheapest": Lexicographic(
+        levels=(ReachAvoid(goal=GOAL, through=f"!{HAZARD}"), ExpectedCost(goal=GOAL, reward="cost"))
+    ),
+    "cheapest, then least toll": Lexicographic(
+        levels=(ExpectedCost(goal=GOAL, reward="cost"), ExpectedCost(goal=GOAL, reward="toll"))
+    ),
+    "fewest steps, then most gain": Lexicographic(
+        levels=(ExpectedCost(goal=GOAL, reward=None), ExpectedReward(goal=GOAL, reward="gain"))
+    ),
+    "three in a row": Lexicographic(
+        levels=(
+            ReachAvoid(goal=GOAL, through=f"!{HAZARD}"),
+            ExpectedCost(goal=GOAL, reward="toll"),
+            ExpectedCost(goal=GOAL, reward="cost"),
+        )
+    ),
+    "in time, then cheapest": Lexicographic(
+        levels=(Mission(formula=f"F<=3 {GOAL}"), ExpectedCost(goal=GOAL, reward="cost"))
+    ),
+    "safest, then least risk": Lexicographic(levels=(ReachAvoid(goal=GOAL), ReachAvoid(goal=HAZARD, maximise=False))),
+    "likeliest, then the long run": Lexicographic(
+        levels=(ReachAvoid(goal=GOAL), Discounted(reward="gain", discount=0.75))
+    ),
+    "two long runs": Lexicographic(
+        levels=(Discounted(reward="cost", discount=0.5, maximise=False), Discounted(reward="gain", discount=0.75))
+    ),
+    "gain, then toll": Lexicographic(
+        levels=(ExpectedReward(goal=GOAL, reward="gain"), ExpectedCost(goal=GOAL, reward="toll"))
+    ),
+}
+"""Several levels."""
+
 Table = dict[int, dict[str, tuple[list[tuple[float, int]], float]]]
 """state → action → (branches as (probability, target), cost)."""
 
 
 def problem_of(
-    table: Table, objective: Objective, *, goals: list[int], hazards: list[int] | None = None, start: int = 0
+    table: Table,
+    objective: Objective,
+    *,
+    goals: list[int],
+    hazards: list[int] | None = None,
+    start: int = 0,
+    rewards: dict[str, Reward] | None = None,
 ) -> Problem:
-    """Build a problem from a table a person can read."""
+    """Build a problem from a table a person can read, with further rewards beside its cost."""
     actions = sorted({action for row in table.values() for action in row})
     states, choices, targets, probabilities, named, costs = [0], [0], [], [], [], []
     for state in sorted(table):
@@ -51,7 +115,7 @@ def problem_of(
         choice_to_action=np.array(named),
         actions=tuple(actions),
         labels={"goal": mask[0].copy(), "hazard": mask[1].copy()},
-        rewards={"cost": Reward(choice=np.array(costs))},
+        rewards={"cost": Reward(choice=np.array(costs)), **(rewards or {})},
         initial=np.array([start]),
     )
     return Problem(mdp=mdp, objective=objective, source="test")
@@ -81,6 +145,35 @@ def random_problem(random: Random, *, most_states: int = 8, objective: Objective
     wanted = objective or random.choice(list(OBJECTIVES.values()))
     return problem_of(
         random_table(random, states), wanted, goals=goals, hazards=hazards, start=random.randrange(states)
+    )
+
+
+def further_rewards(random: Random, table: Table) -> dict[str, Reward]:
+    """Return a reward of both signs ("gain", on states, choices or branches) and a second cost ("toll")."""
+    choices = sum(len(row) for row in table.values())
+    branches = sum(len(spread) for row in table.values() for spread, _ in row.values())
+    amounts = [0.0, 0.0, -1.0, -1.0, 1.0, 2.0, -3.0, 0.1] if random.random() < 0.5 else [-1.0, -1.0, -2.0, 0.0, 0.5]
+    where = random.choice(["choice", "choice", "state", "branch"])
+    count = {"state": len(table), "choice": choices, "branch": branches}[where]
+    gain = {where: np.array(random.choices(amounts, k=count))}
+    if random.random() < 0.2:
+        gain["state"] = np.array(random.choices([-1.0, 0.0, 1.0], k=len(table)))
+    toll = np.array(random.choices([0.0, 0.0, 1.0, 1.0, 0.25], k=choices))
+    return {"gain": Reward(**gain), "toll": Reward(choice=toll)}
+
+
+def random_rich_problem(random: Random, *, most_states: int = 8, objective: Objective) -> Problem:
+    """Return a random problem with further rewards, at least one goal and mostly a hazard."""
+    states = random.randint(2, most_states)
+    special = random.sample(range(states), min(states, random.choice([1, 2, 2, 3])))
+    table = random_table(random, states)
+    return problem_of(
+        table,
+        objective,
+        goals=special[:1] + special[2:],
+        hazards=special[1:2],
+        start=random.randrange(states),
+        rewards=further_rewards(random, table),
     )
 
 

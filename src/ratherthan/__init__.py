@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ratherthan.errors import InputError as InputError
     from ratherthan.errors import MissingExtraError as MissingExtraError
     from ratherthan.errors import ModelError as ModelError
+    from ratherthan.errors import NotExplainableError as NotExplainableError
     from ratherthan.errors import PolicyError as PolicyError
     from ratherthan.errors import PropertyError as PropertyError
     from ratherthan.errors import QuestionError as QuestionError
@@ -38,7 +39,11 @@ if TYPE_CHECKING:
     from ratherthan.model.mdp import MDP as MDP
     from ratherthan.model.mdp import Reward as Reward
     from ratherthan.model.names import StateNames as StateNames
+    from ratherthan.model.objective import Discounted as Discounted
     from ratherthan.model.objective import ExpectedCost as ExpectedCost
+    from ratherthan.model.objective import ExpectedReward as ExpectedReward
+    from ratherthan.model.objective import Lexicographic as Lexicographic
+    from ratherthan.model.objective import Mission as Mission
     from ratherthan.model.objective import ReachAvoid as ReachAvoid
     from ratherthan.model.objective import Threshold as Threshold
     from ratherthan.model.policy import Policy as Policy
@@ -52,21 +57,28 @@ if TYPE_CHECKING:
     from ratherthan.solve import Solution as Solution
     from ratherthan.solve import evaluate as evaluate
     from ratherthan.solve import solve as solve
+    from ratherthan.solve.pareto import Tradeoffs as Tradeoffs
+    from ratherthan.solve.pareto import tradeoffs as tradeoffs
     from ratherthan.verify import Verdicts as Verdicts
     from ratherthan.verify import verify as verify
 
     __version__: str
 
 __all__ = [  # noqa: RUF022 - sorted as `sorted` does, which a test holds
+    "Discounted",
     "ExpectedCost",
+    "ExpectedReward",
     "Explanation",
     "ExplanationError",
     "Factors",
     "InputError",
+    "Lexicographic",
     "Lexicon",
     "MDP",
     "MissingExtraError",
+    "Mission",
     "ModelError",
+    "NotExplainableError",
     "Outcome",
     "Policy",
     "PolicyError",
@@ -81,6 +93,7 @@ __all__ = [  # noqa: RUF022 - sorted as `sorted` does, which a test holds
     "SourceError",
     "StateNames",
     "Threshold",
+    "Tradeoffs",
     "UnsolvedError",
     "Verdicts",
     "World",
@@ -93,6 +106,7 @@ __all__ = [  # noqa: RUF022 - sorted as `sorted` does, which a test holds
     "read_policy",
     "solve",
     "to_json",
+    "tradeoffs",
     "verify",
     "write",
 ]
@@ -105,13 +119,22 @@ _ROOMS = {
     "model.lexicon": ["Lexicon"],
     "model.mdp": ["MDP", "Reward"],
     "model.names": ["StateNames"],
-    "model.objective": ["ExpectedCost", "ReachAvoid", "Threshold"],
+    "model.objective": [
+        "Discounted",
+        "ExpectedCost",
+        "ExpectedReward",
+        "Lexicographic",
+        "Mission",
+        "ReachAvoid",
+        "Threshold",
+    ],
     "model.policy": ["Policy"],
     "model.problem": ["Problem"],
     "model.property": ["parse_property"],
     "model.world": ["World"],
     "narrate": ["from_json", "narrate", "to_json"],
     "solve": ["Outcome", "Solution", "evaluate", "solve"],
+    "solve.pareto": ["Tradeoffs", "tradeoffs"],
     "verify": ["Verdicts", "verify"],
 }
 _HOMES = {name: f"{__name__}.{room}" for room, names in _ROOMS.items() for name in names}

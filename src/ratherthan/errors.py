@@ -7,6 +7,7 @@
     │   ├── SourceError             a file or object cannot be read as a model
     │   ├── ModelError              the model breaks a law (probabilities, targets, costs …)
     │   ├── PropertyError           a property cannot be parsed, or not on this model
+    │   │   └── NotExplainableError it is known what it asks, but that cannot be explained
     │   ├── PolicyError             a policy does not fit the model
     │   ├── QuestionError           an unknown state, action, kind or setting
     │   ├── ExplanationError        a stored explanation is broken or was tampered with
@@ -65,6 +66,10 @@ class ModelError(InputError):
 
 class PropertyError(InputError):
     """A property cannot be parsed, or cannot be answered on this model."""
+
+
+class NotExplainableError(PropertyError):
+    """It is known what a property asks, but that cannot be explained; the message names the nearest that can."""
 
 
 class PolicyError(InputError):

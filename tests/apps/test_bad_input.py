@@ -43,7 +43,7 @@ PAPER = "example:paper-5x5"
         (["explain", PAPER, "--rather-than", "up"], "one of south, north; got 'up'"),
         (["explain", PAPER, "--rather-than", "south"], "another action than the one taken"),
         (["explain", PAPER, "--rather-than", "west", "--state", "4"], "Nothing is left to decide"),
-        (["explain", PAPER, "-p", 'Rmin=? [F "destination"]', "-p", "Pmax=? [F true]"], "Give --property once"),
+        (["explain", PAPER, "-p", 'Rmin=? [F "destination"]', "-p", 'Rmin=? [F "destination"]'], "must differ"),
         (["explain", PAPER, "-p", 'R{"distance"}min=? [F "distenation"]'], "'distenation'"),
         (["explain", PAPER, "-p", 'R{"time"}min=? [F "destination"]'], "'time'"),
         (["explain", PAPER, "-p", "Rmin=? [F x=3]"], "'x'"),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from ratherthan.apps.words import OBJECTIVE_WORDS, lexicon_from
-from ratherthan.model.lexicon import Lexicon
+from ratherthan.apps.words import lexicon_from
+from ratherthan.model.lexicon import OBJECTIVE_WORDS, Lexicon
 
 PAPER = "example:paper-5x5"
 WORDS = """
@@ -57,6 +57,27 @@ def test_what_is_not_given_is_said_as_before():
 def test_the_words_of_an_objective_are_those_of_the_templates():
     from ratherthan.narrate.words import language
 
-    for objective in language("en").templates["objectives"].values():
+    templates = language("en").templates
+    arriving = templates["arriving"]["usual"]
+    for objective in (*templates["objectives"].values(), *templates["rewards"].values()):
         for table in objective.values():
-            assert set(table) == set(OBJECTIVE_WORDS)
+            assert {*table, *arriving} == set(OBJECTIVE_WORDS)
+
+
+def test_a_placeholder_that_nothing_fills_is_refused(refused, tmp_path):
+    (tmp_path / "words.toml").write_text('state = "crossing {numbr}"')
+    assert "got '{numbr}'" in refused("explain", PAPER, "--lexicon", tmp_path / "words.toml")
+
+
+def test_words_for_what_the_model_does_not_have_are_told(ask, tmp_path):
+    (tmp_path / "words.toml").write_text(
+        '[actions]\neast = "go"\nup = "rise"\n[states]\n12 = "a"\n99 = "b"\nhome = "c"'
+    )
+    result = ask("explain", PAPER, "--lexicon", tmp_path / "words.toml", "--kind", "naive-state", "--state", "10")
+    assert (result.exit_code, result.stdout) == (0, "We go at grid 10.\n")
+    assert "does not have: action 'up', state '99', state 'home'." in result.stderr
+
+
+def test_an_empty_lexicon_is_called_a_lexicon(refused, tmp_path):
+    (tmp_path / "words.toml").write_text("")
+    assert refused("explain", PAPER, "--lexicon", tmp_path / "words.toml").startswith("A lexicon must not be empty")

@@ -460,3 +460,21 @@ def test_a_limit_can_be_set(tmp_path, random_problem):
     write_npz(random_problem(0), tmp_path / "m.npz")
     with pytest.raises(SourceError, match="100 bytes of memory"):
         read_npz(tmp_path / "m.npz", limits=Limits(most_bytes=100))
+
+
+def test_a_reward_may_hold_lists():
+    rows = {
+        "state_to_choices": [0, 2, 3],
+        "choice_to_branches": [0, 1, 2, 3],
+        "branch_to_target": [1, 0, 1],
+        "branch_to_probability": [1, 1, 1],
+    }
+    for rewards in (Reward(choice=[1, 2, 0]), {"toll": Reward(choice=[1, 2, 0], state=(0, 5))}):
+        (reward,) = from_arrays(**rows, rewards=rewards).mdp.rewards.values()
+        assert reward.choice.tolist() == [1.0, 2.0, 0.0]
+    for wrong, said in ((["a", 1, 2], "numbers"), ([1, 2], "must have 3 entries"), ([1, [2], 3], "toll")):
+        with pytest.raises(InputError, match=said):
+            from_arrays(**rows, rewards={"toll": Reward(choice=wrong)})
+    for wrong in ("ab", [[1], [2, 3], 4], [None] * 3):
+        with pytest.raises(ModelError, match="Reward 'toll' on choices must hold numbers"):
+            MDP(**rows, initial=np.array([0]), rewards={"toll": Reward(choice=wrong)})

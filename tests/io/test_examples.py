@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -111,7 +112,7 @@ def paper() -> Plain:
 
 
 def test_the_names_are_those_of_the_files():
-    assert example_names() == ("city-1", "city-2", "city-3", "delivery", "office", "paper-5x5")
+    assert example_names() == ("city-1", "city-2", "city-3", "delivery", "office", "paper-5x5", "pedestrians")
 
 
 @pytest.mark.parametrize("name", example_names())
@@ -129,7 +130,7 @@ def test_every_example_says_what_it_wants_and_is_solved(name):
     ("name", "goal", "reward"),
     [
         *((name, "destination", reward) for name in CITIES for reward in ("distance", "time")),
-        *(("office", "destination", reward) for reward in ("distance", "risk")),
+        *((name, "destination", reward) for name in ("office", "pedestrians") for reward in ("distance", "risk")),
         *(("delivery", "delivered", reward) for reward in ("energy", "time")),
         ("paper-5x5", "destination", "distance"),
     ],
@@ -141,7 +142,7 @@ def test_the_package_agrees_with_plain_loops(name, goal, reward):
 
 
 def test_an_unknown_example_is_refused_with_a_list():
-    with pytest.raises(SourceError, match=r"city-1, .*, paper-5x5; got 'paper-5x6'\. Did you mean 'paper-5x5'\?"):
+    with pytest.raises(SourceError, match=r"city-1, .*, pedestrians; got 'paper-5x6'\. Did you mean 'paper-5x5'\?"):
         read_example("paper-5x6")
     with pytest.raises(SourceError, match="must be one of"):
         read_example("../roadmap")
@@ -271,6 +272,74 @@ def test_in_the_office_the_safest_way_is_not_quite_safe():
     solution = rt.solve(problem, safest)
     # One cell of the way has people at one side: 0.9 ahead against a drift of 0.02 to them decide it.
     assert solution.values[0, 26] == pytest.approx(0.9 / 0.92, rel=1e-9)
+
+
+# ---- the way past the market
+
+
+def ways(problem: rt.Problem, wish: str | ExpectedCost) -> list[int]:
+    """Return the cells of the route that is explained."""
+    objective = problem.properties[wish] if isinstance(wish, str) else wish
+    solution = rt.solve(problem, objective)
+    mdp, at, route = problem.mdp, int(problem.mdp.initial[0]), []
+    while not mdp.labels["destination"][at]:
+        route.append(at)
+        branches = mdp.branches_of(int(solution.policy.choice[at]))
+        at = int(mdp.branch_to_target[branches][mdp.branch_to_probability[branches].argmax()])
+    return route
+
+
+SHORT = [24, 25, 26, 27, 28, 29, 30]
+BETWEEN = [24, 25, 33, 41, 42, 43, 44, 45, 46, 38, 30]
+SAFE = [24, 16, 8, 0, 1, 2, 3, 4, 5, 6, 7, 15, 23]
+
+
+def test_past_the_market_there_are_three_routes():
+    problem = read_example("pedestrians")
+    assert ways(problem, "shortest") == SHORT
+    assert ways(problem, "between") == BETWEEN
+    assert ways(problem, "safest") == SAFE
+    crowd = set(np.flatnonzero(problem.mdp.labels["crowd"]).tolist())
+    crossings = set(np.flatnonzero(problem.mdp.labels["crossing"]).tolist())
+    assert [(len(crowd & {*route}), len(crossings & {*route})) for route in (SHORT, BETWEEN, SAFE)] == [
+        (4, 0),
+        (0, 2),
+        (0, 0),
+    ]
+
+
+def test_the_three_routes_have_the_values_worked_by_hand():
+    problem = read_example("pedestrians")
+    # Each move takes 1 / 0.8 attempts; an attempt to leave a cell of the market meets 0.4 people, at a crossing 0.08.
+    by_hand = {"shortest": (7 / 0.8, 4 * 0.4 / 0.8), "between": (11 / 0.8, 2 * 0.08 / 0.8), "safest": (13 / 0.8, 0.0)}
+    for wish, values in by_hand.items():
+        policy = rt.solve(problem, problem.properties[wish]).policy
+        for reward, value in zip(("distance", "risk"), values, strict=True):
+            found = rt.evaluate(problem, policy, ExpectedCost(goal='"destination"', reward=reward))
+            assert found.policy_values[0, 24] == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("weight", "route"),
+    [(0.1, SHORT), (2.7, SHORT), (2.8, BETWEEN), (10, BETWEEN), (12.4, BETWEEN), (12.6, SAFE), (1000, SAFE)],
+)
+def test_a_weighted_sum_of_distance_and_risk_picks_each_of_the_routes_for_a_range_of_weights(weight, route):
+    # 5 more distance for 1.8 less risk is worth it from W = 25/9 on, 2.5 more for 0.2 less from W = 12.5 on.
+    wish = ExpectedCost(goal='"destination"', reward=f"distance + {weight} * risk")
+    assert ways(read_example("pedestrians"), wish) == route
+
+
+def test_the_three_routes_are_explained_in_words_of_their_own():
+    problem = read_example("pedestrians")
+    said = {
+        name: rt.narrate(rt.explain(rt.solve(replace(problem, objective=wish))))
+        for name, wish in problem.properties.items()
+    }
+    assert said["shortest"].startswith("First, we move east at critical grid 24 because it leads to the shortest")
+    assert (
+        "we move south at critical grid 25 because it leads to the best route between short and safe" in said["between"]
+    )
+    assert said["safest"].startswith("First, we move north at critical grid 24 because it leads to the safest route.")
 
 
 # ---- the delivery

@@ -259,6 +259,39 @@ def test_prisms_lists_name_states_by_their_variables(file, text):
         assert policy.chance is None
 
 
+MIXED = """mdp
+global lamp : bool init true;
+module walker
+  x : [0..2] init 0;
+  tired : bool init false;
+  [go] x<2 & !tired -> 0.5 : (x'=x+1) + 0.5 : (tired'=true);
+  [rest] tired -> (tired'=false) & (lamp'=false);
+  [stay] true -> true;
+endmodule
+module other = walker [x=y, tired=weary, go=run, rest=doze, stay=sit] endmodule
+"""
+
+
+def test_a_program_tells_in_which_order_prism_numbers_its_states(file, tmp_path):
+    pytest.importorskip("stormpy")
+    (tmp_path / "mixed.prism").write_text(MIXED)
+    mdp = rt.read(tmp_path / "mixed.prism").mdp
+    names = ["lamp", "x", "tired", "y", "weary"]
+    assert list(mdp.names.variables) == names  # Storm lists truth values first
+    columns = [np.asarray(mdp.names.variables[name]).tolist() for name in names]
+    states = sorted(range(mdp.states), key=lambda s: [column[s] for column in columns])
+    wanted = ["stay" if column else "sit" for column in columns[2]]
+    by_number = "".join(f"{i}={wanted[s]}\n" for i, s in enumerate(states))
+    shown = [",".join(str(column[s]).lower() for column in columns) for s in range(mdp.states)]
+    by_values = "".join(f"({shown[s]})={wanted[s]}\n" for s in states)
+    policy = read_policy(file("numbers.txt", by_number), mdp)
+    assert policy.choice.tolist() == read_policy(file("values.txt", by_values), mdp).choice.tolist()
+    assert [mdp.action_name(choice) for choice in policy.choice] == wanted
+    branches = [(i, states.index(s), wanted[s]) for i, s in enumerate(states)]
+    induced = f"{mdp.states} {mdp.states}\n" + "".join(f"{i} {i} 1 {name}\n" for i, _, name in branches)
+    assert read_policy(file("induced.tra", induced), mdp).choice.tolist() == policy.choice.tolist()
+
+
 def test_prism_numbers_states_in_the_order_of_their_variables(file):
     text = "0=rest\n1=back\n2=back\n3=\n"
     assert read_policy(file("s.txt", text), numbered()).choice.tolist() == [2, 4, 5, 7]

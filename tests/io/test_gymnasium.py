@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ratherthan.errors import InputError, MissingExtraError, ModelError, SourceError
+from ratherthan.errors import InputError, MissingExtraError, ModelError, PolicyError, SourceError
 from ratherthan.io import read, write
 from ratherthan.io._gym_calls import Foreign, check_steps, plain_of
 from ratherthan.io._gym_entries import table_from
@@ -23,6 +23,8 @@ from ratherthan.io._gym_json import is_table
 from ratherthan.io._gym_model import Ended, mdp_of
 from ratherthan.io._gym_text import split_source
 from ratherthan.io._gym_values import UnknowableError, value_bytes
+from ratherthan.io._policy_match import decided_states
+from ratherthan.io.policies import read_policy
 from ratherthan.model.mdp import MDP
 from ratherthan.model.problem import Problem
 from ratherthan.solve import solve
@@ -78,24 +80,58 @@ def test_the_chance_to_cross_the_lake_is_the_known_one_everywhere(envs, ice):
     assert solve(problem).values[0] == pytest.approx(expected, abs=1e-9)
 
 
-def test_the_least_cost_of_the_cliff_is_the_known_one_everywhere(envs):
+OWN = 'R{"reward"}max=? [Fsure "terminal"]'
+
+
+def test_the_reward_of_the_cliff_is_the_known_one_everywhere(envs):
     path = envs / "CliffWalking-v1.json.gz"
     problem = read(path)
-    assert problem.objective.text == 'R{"cost"}min=? [F "terminal"]'
-    expected = -np.array(stored(path)[VALUES]["1.0"]["V"])
+    assert problem.objective.text == OWN
+    expected = np.array(stored(path)[VALUES]["1.0"]["V"])
     expected[47] = 0
     values = solve(problem).values[0]
     assert values == pytest.approx(expected, abs=1e-9)
-    assert values[problem.mdp.initial].tolist() == pytest.approx([13.0])
+    assert values[problem.mdp.initial].tolist() == pytest.approx([-13.0])
 
 
-def test_twenty_less_the_least_cost_is_the_known_value_of_every_taxi_ride(envs):
+def test_the_reward_of_every_taxi_ride_is_the_known_one(envs):
     path = envs / "Taxi-v4.json.gz"
-    problem = read(path, objective='R{"cost"}min=? [F "terminal"]')
-    expected = np.array(stored(path)[VALUES]["1.0"]["V"])
-    values = 20 - solve(problem).values[0]
-    assert values[:500] == pytest.approx(expected, abs=1e-9)
+    problem = read(path)
+    assert problem.objective.text == OWN
+    assert list(problem.mdp.rewards) == ["reward"]
+    values = solve(problem).values[0]
+    assert values[:500] == pytest.approx(np.array(stored(path)[VALUES]["1.0"]["V"]), abs=1e-9)
+    assert values[500:].tolist() == [0] * 4
     assert values[problem.mdp.initial].mean() == pytest.approx(stored(path)[VALUES]["1.0"]["V_init_mean"])
+
+
+@pytest.mark.parametrize("discount", ["0.99", "0.95"])
+@pytest.mark.parametrize(
+    "name", ["Taxi-v4", "CliffWalking-v1", "FrozenLake-v1_4x4_slippery", "FrozenLake-v1_4x4_deterministic"]
+)
+def test_discounted_rewards_are_the_known_ones_everywhere(envs, name, discount):
+    path = envs / f"{name}.json.gz"
+    problem = read(path, objective=f'R{{"reward"}}max=? [Cdiscount={discount}]')
+    table = stored(path)
+    expected = np.array(table[VALUES][discount]["V"])
+    live = ~problem.mdp.labels["terminal"][: table["nS"]]  # nothing is earned after the end
+    assert solve(problem).values[0][: table["nS"]][live] == pytest.approx(expected[live], abs=1e-9)
+
+
+def iterated(mdp: MDP, discount: float) -> np.ndarray[Any, Any]:
+    """Return the discounted values of a model by plain value iteration."""
+    values = np.zeros(mdp.states)
+    for _ in range(3000):
+        paid = mdp.branch_to_probability * (mdp.rewards["reward"].branch + discount * values[mdp.branch_to_target])
+        action_values = np.add.reduceat(paid, mdp.choice_to_branches[:-1])
+        values = np.maximum.reduceat(action_values, mdp.state_to_choices[:-1])
+    return values
+
+
+@pytest.mark.parametrize("source", ["gym:Taxi-v4,is_rainy=true", "gym:Taxi-v4", "gym:CliffWalking-v1,is_slippery=true"])
+def test_discounted_rewards_are_those_of_value_iteration(gym, source):
+    problem = read(source, objective='R{"reward"}max=? [Cdiscount=0.99]')
+    assert solve(problem).values[0] == pytest.approx(iterated(problem.mdp, 0.99), abs=1e-8)
 
 
 @pytest.mark.parametrize(("name", "steps"), [("Empty-5x5-v0_seed0", 5), ("LavaGapS5-v0_seed1", 7)])
@@ -234,36 +270,23 @@ def test_ends_are_labelled_by_what_they_pay(table):
         assert all(row == [(1.0, state, 0.0)] for row in branches(mdp, state))
 
 
-@given(tables())
-def test_the_least_cost_is_what_the_largest_reward_falls_short_of(table):
-    ended = Ended.of(table_from(table, "a table"), np.array([0]))
-    if ended.cost is None:
-        return
-    mdp, _ = mdp_of(ended, np.array([0]), tuple(f"a{i}" for i in range(len(table[0]))))
-    cost, reward = mdp.rewards["cost"].branch, mdp.rewards["reward"].branch
-    leaves = ~np.repeat(ended.terminal, np.diff(mdp.choice_to_branches[mdp.state_to_choices]))
-    ends = leaves & ended.terminal[mdp.branch_to_target]
-    assert (cost >= 0).all()
-    assert cost == pytest.approx(np.where(ends, ended.bonus, 0.0) - reward)
-
-
 @pytest.mark.parametrize(
     ("table", "objective"),
     [
         # only arrival pays, with and without a hazard
         ([[[[0.5, 1, 0.0, True], [0.5, 2, 5.0, True]]], [[[1.0, 1, 0.0, True]]], [[[1.0, 2, 0.0, True]]]], 'Pmax=? [!"hazard" U "goal"]'),
         ([[[[0.5, 0, 0.0, False], [0.5, 1, 5.0, True]]], [[[1.0, 1, 0.0, True]]]], 'Pmax=? [F "goal"]'),
-        # nothing earns more than 0
-        ([[[[0.5, 0, -1.0, False], [0.5, 1, 0.0, True]]], [[[1.0, 1, 0.0, True]]]], 'R{"cost"}min=? [F "terminal"]'),
-        # steps cost and arrival pays, arrival pays more or less, nothing pays, no end
-        ([[[[1.0, 1, 0.0, True]]], [[[1.0, 1, 0.0, True]]]], None),
-        ([[[[0.5, 0, -1.0, False], [0.5, 1, 1.0, True]]], [[[1.0, 1, 0.0, True]]]], None),
-        ([[[[0.5, 0, 1.0, False], [0.5, 1, 1.0, True]]], [[[1.0, 1, 0.0, True]]]], None),
-        ([[[[0.5, 1, 2.0, True], [0.5, 1, 1.0, True]]], [[[1.0, 1, 0.0, True]]]], None),
+        # steps cost, steps cost and arrival pays, steps pay, arrival pays more or less, nothing pays
+        ([[[[0.5, 0, -1.0, False], [0.5, 1, 0.0, True]]], [[[1.0, 1, 0.0, True]]]], OWN),
+        ([[[[0.5, 0, -1.0, False], [0.5, 1, 1.0, True]]], [[[1.0, 1, 0.0, True]]]], OWN),
+        ([[[[0.5, 0, 1.0, False], [0.5, 1, 1.0, True]]], [[[1.0, 1, 0.0, True]]]], OWN),
+        ([[[[0.5, 1, 2.0, True], [0.5, 1, 1.0, True]]], [[[1.0, 1, 0.0, True]]]], OWN),
+        ([[[[1.0, 1, 0.0, True]]], [[[1.0, 1, 0.0, True]]]], OWN),
+        # no end
         ([[[[1.0, 0, -1.0, False]]]], None),
     ],
 )  # fmt: skip
-def test_an_objective_is_set_only_where_its_best_policies_earn_the_most(tmp_path, table, objective):
+def test_the_objective_is_that_of_the_environment(tmp_path, table, objective):
     path = tmp_path / "table.json"
     path.write_text(json.dumps({"nS": len(table), "nA": 1, "P": table, "initial": 0}))
     found = read(path).objective
@@ -444,10 +467,29 @@ def test_the_lake_is_a_map_with_holes_and_a_goal(gym):
     assert any("100 steps" in note for note in problem.notes)
 
 
-def test_a_lake_whose_steps_pay_has_no_objective_that_would_mean_something_else(gym):
-    assert read("gym:FrozenLake-v1,reward_schedule=[1,0,0.1]").objective is None
-    assert read("gym:FrozenLake-v1,reward_schedule=[1,-1,-0.1]").objective is None
-    assert read("gym:FrozenLake-v1,reward_schedule=[0,-5,-1]").objective.text == 'R{"cost"}min=? [F "terminal"]'
+@pytest.mark.parametrize("schedule", ["[1,0,0.1]", "[1,-1,-0.1]", "[0,-5,-1]"])
+def test_where_steps_pay_or_cost_the_most_reward_is_wanted(gym, schedule):
+    assert read(f"gym:FrozenLake-v1,reward_schedule={schedule}").objective.text == OWN
+
+
+def test_where_going_on_pays_a_note_says_what_that_means(gym):
+    paying, plain = read("gym:FrozenLake-v1,reward_schedule=[1,0,0.1]"), read("gym:FrozenLake-v1")
+    assert any(note.startswith("Going on may pay") for note in paying.notes)
+    assert not any(note.startswith("Going on may pay") for note in plain.notes)
+    assert solve(paying).values[0][0] == np.inf
+    found = read("gym:FrozenLake-v1,reward_schedule=[1,0,0.1]", objective='R{"reward"}max=? [Cdiscount=0.99]')
+    assert solve(found).values[0] == pytest.approx(iterated(found.mdp, 0.99), abs=1e-8)
+
+
+def test_what_earns_the_most_until_the_end_is_told_by_hand(tmp_path):
+    # Going on pays 2 with probability 1/2, and ends with 1 else; leaving ends at once with 2: 2 / 0.5 / 2 + 1 = 3.
+    table = [[[[0.5, 0, 2.0, False], [0.5, 1, 1.0, True]], [[1.0, 1, 2.0, True]]], [[[1.0, 1, 0.0, True]] * 2]]
+    table[1] = [[[1.0, 1, 0.0, True]], [[1.0, 1, 0.0, True]]]
+    path = tmp_path / "table.json"
+    path.write_text(json.dumps({"nS": 2, "nA": 2, "P": table, "initial": 0, "actions": ["on", "leave"]}))
+    solution = solve(read(path))
+    assert solution.values[0].tolist() == pytest.approx([3.0, 0.0])
+    assert solution.problem.mdp.action_name(int(solution.policy.choice[0])) == "on"
 
 
 @pytest.mark.parametrize("rainy", [False, True])
@@ -594,7 +636,7 @@ def test_an_environment_without_a_table_is_explored(gym):
     assert vars(made) == before  # it stays as it is
     assert problem.mdp.states == 10
     assert problem.mdp.names[0] == "cell=0, lamp=false"
-    assert solve(problem).values[0][0] == pytest.approx(5)
+    assert solve(problem).values[0][0] == pytest.approx(-5)
     assert problem.mdp.initial.tolist() == [0]
 
 
@@ -801,3 +843,58 @@ def test_a_grid_is_walked_as_its_plan_says(gym):
 def test_moving_obstacles_are_refused(gym):
     pytest.importorskip("minigrid")
     assert "chance" in sentence_of("gym:MiniGrid-Dynamic-Obstacles-5x5-v0")
+
+
+# what was learned from an environment
+
+
+class Learned:
+    """An agent that has seen the states of the environment."""
+
+    def __init__(self, table: np.ndarray[Any, Any], states: int) -> None:
+        self.table = table
+        self.observation_space = type("Discrete", (), {"n": states, "start": 0})()
+
+    def predict(self, observation: np.ndarray[Any, Any], deterministic: bool) -> tuple[Any, None]:
+        assert deterministic
+        assert (observation < len(self.table)).all()
+        return self.table[observation].argmax(axis=1), None
+
+
+def test_what_was_learned_from_the_taxi_fits_its_model_without_the_added_ends(gym):
+    problem = read("gym:Taxi-v4")
+    draw = np.random.default_rng(0)
+    q = draw.normal(size=(500, 6))
+    whole = read_policy(np.concatenate([q, np.zeros((4, 6))]), problem.mdp)
+    ends = problem.mdp.state_to_choices[500:504].tolist()
+    for learned in (q, q.argmax(axis=1), Learned(q, 500), Learned(np.concatenate([q, q[:4]]), 504)):
+        policy = read_policy(learned, problem.mdp)
+        assert policy.choice[:500].tolist() == whole.choice[:500].tolist()
+        assert ((policy.choice[500:] >= ends) & (policy.choice[500:] < np.array(ends) + 6)).all()
+    assert read_policy(-q, problem.mdp, minimise_q=True).choice.tolist() == whole.choice.tolist()
+
+
+@pytest.mark.parametrize("rows", [499, 505, 1])
+def test_a_table_of_another_size_is_refused(gym, rows):
+    mdp = read("gym:Taxi-v4").mdp
+    for learned in (np.zeros((rows, 6)), np.zeros(rows, dtype=int), Learned(np.zeros((rows, 6)), rows)):
+        with pytest.raises(PolicyError, match="504"):
+            read_policy(learned, mdp)
+
+
+def test_only_terminal_states_that_loop_may_be_left_out():
+    for source, least in (("example:paper-5x5", 25), ("example:delivery", None)):
+        mdp = read(source).mdp
+        with pytest.raises(PolicyError):
+            read_policy(np.zeros((mdp.states - 1, len(mdp.actions))), mdp)
+        assert decided_states(mdp) == (least or mdp.states)
+
+
+def test_at_the_edges_of_the_lake_and_the_cliff_ends_are_what_they_are(gym):
+    lake, cliff = read("gym:FrozenLake-v1").mdp, read("gym:CliffWalking-v1").mdp
+    assert np.flatnonzero(lake.labels["hazard"]).tolist() == [5, 7, 11, 12]
+    assert np.flatnonzero(lake.labels["goal"]).tolist() == [15]
+    assert np.flatnonzero(cliff.labels["terminal"]).tolist() == [47]  # falling off leads back to the start: no end
+    assert not cliff.labels["hazard"].any()
+    assert decided_states(lake) == 15
+    assert decided_states(cliff) == 47

@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 
 from ratherthan.errors import MissingExtraError, PropertyError, SourceError
-from ratherthan.io._jani_terms import Vocabulary, property_text, term_of
+from ratherthan.io._jani_properties import property_text
+from ratherthan.io._jani_terms import Vocabulary, term_of
 from ratherthan.io.jani import read_jani
 from ratherthan.model.mdp import Reward
+from ratherthan.model.objective import Mission
 from ratherthan.model.property import parse_property
 from ratherthan.model.syntax import parse_formula, text_of
 
@@ -213,9 +215,15 @@ def test_properties_that_can_be_explained_come_along(stormpy: Any, write: Write)
     left_out = {note.split("'")[1]: note for note in problem.notes if note.startswith("Property")}
     assert set(left_out) == {"half", "bounded", "unset", "long_run"}
     assert "A part only of the reward 'both'" in left_out["half"]
-    assert "F with a bound" in left_out["bounded"]
+    assert "only_asked" in left_out["bounded"]
     assert "got 'only_asked'" in left_out["unset"]
-    assert "Smax" in left_out["long_run"]
+    assert "long-run average" in left_out["long_run"]
+    assert problem.others == {"long_run": 'LRAmax=? ["done"]'}
+
+
+def test_a_bound_of_steps_is_a_mission(stormpy: Any, write: Write) -> None:
+    problem = read_jani(write(MODEL), constants="N=2,only_asked=7")
+    assert problem.properties["bounded"] == Mission(formula='F<=7 "done"', maximise=True)
 
 
 def test_a_user_may_write_labels_and_constants_by_their_bare_names(stormpy: Any, write: Write) -> None:
@@ -288,6 +296,10 @@ def test_without_storm_the_command_that_installs_it_is_said(write: Write, monkey
         read_jani(write(MODEL), constants="N=2")
 
 
+def bounded(bounds: dict[str, Any]) -> dict[str, Any]:
+    return {"op": "Pmax", "exp": {"op": "F", "exp": "done", "step-bounds": bounds}}
+
+
 # -- expressions and properties, without Storm ---------------------------------------------------------------------------
 
 WORDS = Vocabulary(
@@ -337,6 +349,40 @@ def test_expressions_are_said_in_prisms_words(tree: Any, text: str) -> None:
         (asked(reach("mixed", "exit", "steps")), 'R{"mixed"}min=? [F "done"]'),
         (asked(reach("nothing")), 'R{"nothing"}min=? [F "done"]'),
         (asked(reach(1, "steps", "exit", op="Emax")), 'Tmax=? [F "done"]'),
+        (asked({"op": "Smax", "exp": "a"}), "LRAmax=? [a]"),
+        (asked({"op": "Smin", "exp": "cost", "accumulate": ["steps"]}), 'R{"cost"}min=? [LRA]'),
+        (asked({"op": "Emax", "exp": "cost", "accumulate": ["steps"]}), 'R{"cost"}max=? [C]'),
+        (asked({"op": "Emax", "exp": "cost", "accumulate": ["steps"], "step-instant": "K"}), 'R{"cost"}max=? [C<=K]'),
+        (
+            asked({"op": "Pmax", "exp": {**operation("U", "a", "done"), "step-bounds": {"upper": "K"}}}),
+            'Pmax=? [a U<=K "done"]',
+        ),
+        (asked(bounded({"upper": operation("+", "K", 1), "upper-exclusive": True})), 'Pmax=? [F<(K + 1) "done"]'),
+        (asked(bounded({"lower": 2})), 'Pmax=? [F>=2 "done"]'),
+        (asked(bounded({"lower": 2, "upper": 5})), 'Pmax=? [F[2,5] "done"]'),
+        (
+            asked(
+                {
+                    "op": "Pmin",
+                    "exp": {
+                        "op": "F",
+                        "exp": "done",
+                        "reward-bounds": [{"exp": "cost", "accumulate": ["steps"], "bounds": {"upper": 3}}],
+                    },
+                }
+            ),
+            'Pmin=? [F{"cost"}<=3 "done"]',
+        ),
+        (asked({"op": "Pmax", "exp": {"op": "G", "exp": {"op": "F", "exp": "done"}}}), 'Pmax=? [G (F "done")]'),
+        (
+            asked(
+                {
+                    "op": "Pmax",
+                    "exp": operation("∧", {"op": "F", "exp": "a"}, {"op": "¬", "exp": {"op": "F", "exp": "done"}}),
+                }
+            ),
+            'Pmax=? [((F a)) & ((!((F "done"))))]',
+        ),
     ],
 )
 def test_properties_are_said_in_prisms_syntax(tree: Any, text: str) -> None:
@@ -350,11 +396,15 @@ def test_properties_are_said_in_prisms_syntax(tree: Any, text: str) -> None:
         (asked(arrive("done"), fun="count"), "A filter over other than the initial states"),
         (asked(arrive("done"), states="a"), "A filter over other than the initial states"),
         (asked({"op": "∀", "exp": "a"}), "The operator '∀'"),
-        (asked({"op": "Smax", "exp": "a"}), "The operator 'Smax'"),
+        (asked({"op": "Cmax", "exp": "a"}), "The operator 'Cmax'"),
+        (asked({"op": "Emax", "exp": "cost", "step-instant": 3}), "A part only of the reward 'cost'"),
+        (asked({"op": "Emax", "exp": "nothing", "step-instant": 3}), "The value of an expression at one step"),
+        (asked({"op": "Pmax", "exp": {"op": "F", "exp": "done", "time-bounds": {"upper": 3}}}), "A bound on time"),
+        (asked(bounded({"lower": 1, "upper": 3, "lower-exclusive": True})), "two ends"),
         (asked("done"), "no probability and no expected value"),
         (asked({"op": "Pmax", "exp": "a"}), "no until, eventually or always"),
-        (asked({"op": "Emax", "exp": "cost", "accumulate": ["steps"]}), "other than until a goal"),
-        (asked({**reach("cost", "steps"), "step-instant": 3}), "other than until a goal"),
+        (asked({**reach("cost", "steps"), "step-instant": 3}), "until a time or until a reward"),
+        (asked({**reach("cost", "steps"), "time-instant": 3}), "until a time or until a reward"),
         (asked(reach(operation("*", 2, "cost"), "steps")), "more than one variable"),
         (asked(reach(1, "exit")), "more than one variable"),
         (asked(reach("cost", "exit")), "A part only of the reward 'cost'"),

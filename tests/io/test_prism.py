@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
 import sys
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -260,3 +265,52 @@ def test_storms_log_level_is_left_as_it_was(write: Write) -> None:
     with pytest.raises(SourceError):
         read_prism(write("hello", "broken.prism"))
     assert stormpy.developer.get_log_level() == before
+
+
+@pytest.fixture
+def interrupted() -> Iterator[None]:
+    """Somebody who presses Ctrl-C after two seconds."""
+    timer = threading.Timer(2.0, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    yield
+    timer.cancel()
+
+
+posix = pytest.mark.skipif(sys.platform != "linux", reason="signals, and copies of a process")
+
+
+@posix
+@pytest.mark.slow
+@pytest.mark.usefixtures("interrupted")
+def test_storm_can_be_interrupted_while_it_builds(write: Write) -> None:
+    variables = "".join(f"x{i} : [0..99] init 0;" for i in range(4))
+    ways = "".join(f"[] x{i}<99 -> (x{i}'=x{i}+1);" for i in range(4))
+    path = write(f"mdp module m {variables} {ways} endmodule")
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        read_prism(path)
+    assert time.monotonic() - begun < 8
+
+
+@posix
+@pytest.mark.slow
+@pytest.mark.usefixtures("interrupted")
+def test_after_storm_has_worked_an_interruption_is_heard_at_once(write: Write) -> None:
+    read_prism(write(WALK), constants={"N": "3"})
+    begun = time.monotonic()
+    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(30)"]) as child:
+        with pytest.raises(KeyboardInterrupt):
+            os.waitpid(child.pid, 0)
+        child.kill()
+    assert time.monotonic() - begun < 8
+
+
+def test_variables_come_in_the_order_of_their_declaration(write: Write) -> None:
+    text = """mdp
+    module a  p : [0..1] init 0; q : bool init false; [] true -> (p'=1) & (q'=true); endmodule
+    global g : [0..1] init 0; global h : bool init true; // r : bool;
+    module b = a [p=s, q=t] endmodule
+    module c = a [p=u, q=v] endmodule
+    """
+    variables = read_prism(write(text)).mdp.names.variables
+    assert list(variables) == ["g", "h", "p", "q", "s", "t", "u", "v"]

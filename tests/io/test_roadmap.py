@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ratherthan.errors import InputError, PropertyError, SourceError
-from ratherthan.io._roadmap_tables import ACTIONS, OBJECTIVE_WORDS, STANDARD_KINDS
+from ratherthan.io._roadmap_tables import ACTIONS, STANDARD_KINDS
 from ratherthan.io.examples import read_example
 from ratherthan.io.roadmap import _differences, format_roadmap, parse_roadmap, read_roadmap, write_roadmap
+from ratherthan.model.lexicon import OBJECTIVE_WORDS
 from ratherthan.model.objective import ExpectedCost, ReachAvoid
 from ratherthan.model.problem import Problem
 from ratherthan.narrate.words import language
@@ -188,8 +189,10 @@ q = { name = "quicksand", leave = false }
 
 
 def test_the_words_for_objectives_are_those_of_the_templates():
-    tables = language("en").templates["objectives"]
-    assert all(set(words) == set(OBJECTIVE_WORDS) for kind in tables.values() for words in kind.values())
+    templates = language("en").templates
+    arriving = templates["arriving"]["usual"]
+    for tables in (templates["objectives"], templates["rewards"]):
+        assert all({*words, *arriving} == set(OBJECTIVE_WORDS) for kind in tables.values() for words in kind.values())
 
 
 # ---- what a map must not say
@@ -439,7 +442,7 @@ def test_the_arrays_are_those_of_the_plain_definition(town):
             assert branches(problem, state, action) == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["paper-5x5", "city-1", "city-2", "city-3", "office"])
+@pytest.mark.parametrize("name", ["paper-5x5", "city-1", "city-2", "city-3", "office", "pedestrians"])
 def test_examples_survive_being_written(name, tmp_path):
     problem = read_example(name)
     write_roadmap(problem, tmp_path / "again.roadmap")
@@ -512,3 +515,25 @@ def test_a_million_cells_are_read():
     text = f"success = 0.9\ndrift = 0.04\nmap = '''\n{rows}\n'''\n[costs]\ntime = {{ other = 1, highway = 0.5 }}"
     problem = parse_roadmap(text)
     assert problem.mdp.states == 1_000_000
+
+
+WEIGHED = "map='SD'\n[costs]\ndistance=1\nrisk=2\n[words.objectives.'{}']\nbest='the balance'\n"
+
+
+def test_a_weighted_sum_has_words_of_its_own_in_its_one_spelling():
+    problem = parse_roadmap(WEIGHED.format("1*distance+10.0 * risk"))
+    assert problem.lexicon.objectives == {"distance + 10 * risk": {"best": "the balance"}}
+    assert parse_roadmap(format_roadmap(problem)).lexicon == problem.lexicon
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (WEIGHED.format("distance + 10 * rsik"), "must be among"),
+        (WEIGHED.format("distance + -1 * risk"), "A weight must be a finite number from 0 on"),
+        (WEIGHED.format("distance + risk") + "[words.objectives.'1*distance + risk']\nbest='b'", "words once"),
+    ],
+)
+def test_words_of_a_sum_that_is_none_are_refused(text, message):
+    with pytest.raises(SourceError, match=message):
+        parse_roadmap(text)

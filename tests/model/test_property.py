@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from lasso import property_of, random_path
 
-from ratherthan.errors import PropertyError
+from ratherthan.errors import NotExplainableError, PropertyError
 from ratherthan.model.mdp import MDP, Reward
 from ratherthan.model.names import StateNames
-from ratherthan.model.objective import ExpectedCost, Objective, ReachAvoid, Threshold
+from ratherthan.model.objective import ExpectedCost, Lexicographic, Mission, Objective, ReachAvoid, Threshold
 from ratherthan.model.problem import Problem
 from ratherthan.model.property import choose_objective, parse_property
 
@@ -68,12 +71,103 @@ CHAIN = problem(
         ("Pmax=? [late U x = N]", ReachAvoid(goal="x = 2 + 1", through="x > 2 | busy")),
         ("Pmax=? [F late & x=K*N]", ReachAvoid(goal="(x > 2 | busy) & x = 2 * (2 + 1)")),
         ('"my name": Pmax=? [F "goal"]; // the way home\n', ReachAvoid(goal=GOAL)),
+        ('Pmax=? [F (F "goal")]', ReachAvoid(goal=GOAL)),
+        ('Pmax=? [F "goal" | F "h"]', ReachAvoid(goal='"goal" | "h"')),
+        ('Pmax=? [(F "goal") | (F busy | F "h")]', ReachAvoid(goal='"goal" | busy | "h"')),
+        ('Pmin=? [!(G !"goal")]', ReachAvoid(goal=GOAL, maximise=False)),
+        ('Pmax=? [F>=0 "goal"]', ReachAvoid(goal=GOAL)),
         ('// the way home\nPmax=? [\n F // there\n "goal"\n]', ReachAvoid(goal=GOAL)),
     ],
 )
 def test_objectives_are_read(text: str, wanted: Objective) -> None:
     assert parse_property(text, PROBLEM) == wanted
     assert parse_property(wanted.text, PROBLEM) == wanted
+
+
+@pytest.mark.parametrize(
+    ("text", "formula"),
+    [
+        ('Pmax=? [F<=5 "goal"]', 'F<=5 "goal"'),
+        ('Pmax=? [F<5 "goal"]', 'F<=4 "goal"'),
+        ('Pmax=? [F=5 "goal"]', 'F[5,5] "goal"'),
+        ('Pmax=? [F>5 "goal"]', 'F>=6 "goal"'),
+        ('Pmax=? [Fsteps<=5 "goal"]', 'F<=5 "goal"'),
+        ('Pmax=? [Ftime<=5 "goal"]', 'F<=5 "goal"'),
+        ("Pmax=? [F<=K (x=2)]", "F<=2 (x = 2)"),
+        ("Pmax=? [F[1,K+3] busy]", "F[1,5] busy"),
+        ("Pmax=? [F[0,3] busy]", "F<=3 busy"),
+        ("Pmax=? [F<=max(2,K) x=1]", "F<=2 (x = 1)"),
+        ("Pmax=? [F<=2*(K+1) x=1]", "F<=6 (x = 1)"),
+        ("Pmax=? [busy U<= 3 // steps\n x=1]", "busy U<=3 (x = 1)"),
+        ('Pmax=? [busy Usteps<=200 "goal"]', 'busy U<=200 "goal"'),
+        ('Pmax=? [late U<=7 "goal"]', '(x > 2 | busy) U<=7 "goal"'),
+        ('Pmax=? [true U<=7 "goal"]', 'F<=7 "goal"'),
+        ("Pmax=? [G<=7 busy]", "G<=7 busy"),
+        ("Pmax=? [G<K busy]", "G<=1 busy"),
+        ('Pmax=? [X "goal"]', 'X "goal"'),
+        ('Pmax=? [X X "goal"]', 'X (X "goal")'),
+        ('Pmax=? [F "h" & F "goal"]', 'F ("h" & (F "goal"))'),
+        ('Pmax=? [(F "h") & F "goal"]', '(F "h") & (F "goal")'),
+        ('Pmax=? [(!"h" U "goal") & F busy]', '(!"h" U "goal") & (F busy)'),
+        ('Pmax=? [!"h" U "goal" & F busy]', '!"h" U ("goal" & (F busy))'),
+        ('Pmax=? [busy & X "goal" | "h"]', 'busy & (X ("goal" | "h"))'),
+        ('Pmax=? [F "h" U "goal"]', '(F "h") U "goal"'),
+        ('Pmax=? [busy U X "goal"]', 'busy U (X "goal")'),
+        ('Pmax=? [!X "goal"]', '!(X "goal")'),
+        ('Pmax=? [!(F<=3 "h")]', '!(F<=3 "h")'),
+        ('Pmax=? ["h" & !G<=3 !"goal"]', '"h" & !(G<=3 !"goal")'),
+        ('Pmax=? ["h" => F<=3 "goal"]', '"h" => (F<=3 "goal")'),
+        ('Pmax=? [busy W<=3 "goal"]', 'busy W<=3 "goal"'),
+        ('Pmax=? [busy R<=3 "goal"]', 'busy R<=3 "goal"'),
+        ('Pmax=? [F ("h" & x + 1 = 2 & F "goal")]', 'F ("h" & x + 1 = 2 & (F "goal"))'),
+        ('Pmax=? ["h" ? (F "goal") : (X "goal")]', '"h" ? (F "goal") : (X "goal")'),
+        ('Pmax=? ["h" <=> X "goal"]', '"h" <=> (X "goal")'),
+    ],
+)
+def test_what_needs_memory_is_read_as_a_mission(text: str, formula: str) -> None:
+    assert parse_property(text, PROBLEM) == Mission(formula=formula)
+    assert parse_property(Mission(formula=formula).text, PROBLEM) == Mission(formula=formula)
+    least = Mission(formula=formula, maximise=False)
+    assert parse_property(text.replace("max=", "min="), PROBLEM) == least
+    limit = parse_property(text.replace("max=?", "max>=0.5"), PROBLEM)
+    assert limit == Threshold(objective=Mission(formula=formula), relation=">=", bound=0.5)
+    assert parse_property(limit.text, PROBLEM) == limit
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_the_canonical_text_of_a_mission_reads_back_to_itself(seed: int) -> None:
+    term = random_path(Random(seed), ("goal", "h"))
+    try:
+        read = parse_property(property_of(term), PROBLEM)
+    except NotExplainableError as error:
+        nearest = re.search(r"P(max|min)=\? .*(?=\.$)", error.message)
+        assert nearest
+        assert parse_property(nearest[0], PROBLEM)
+        return
+    assert parse_property(read.text, PROBLEM) == read
+
+
+def test_a_variable_may_be_called_then() -> None:
+    odd = problem(names=StateNames(count=4, variables={"then": np.arange(4) > 1}))
+    read = parse_property('Pmax=? [F[1,2] then & "goal"]', odd)
+    assert read == Mission(formula='F[1,2] (then & "goal")')
+    both = parse_property(f'{read.text} then Pmax=? [F "x] then " | then]', replace_label(odd))
+    assert isinstance(both, Lexicographic)
+    assert both.levels == (read, ReachAvoid(goal='"x] then " | then'))
+
+
+def replace_label(odd: Problem) -> Problem:
+    labels = {**odd.mdp.labels, "x] then ": odd.mdp.labels["goal"]}
+    return problem(names=odd.mdp.names, labels=labels)
+
+
+def test_of_several_properties_only_the_first_may_need_memory() -> None:
+    steps, cost = 'Pmax=? [F<=3 "goal"]', 'R{"cost"}min=? [F "goal"]'
+    read = parse_property(f"{steps} then {cost}", PROBLEM)
+    assert isinstance(read, Lexicographic)
+    assert parse_property(read.text, PROBLEM) == read
+    with pytest.raises(PropertyError, match="only the first may need memory"):
+        parse_property(f"{cost} then {steps}", PROBLEM)
 
 
 @pytest.mark.parametrize(
@@ -113,18 +207,14 @@ def test_without_decisions_min_and_max_need_not_be_said() -> None:
 @pytest.mark.parametrize(
     ("text", "what", "nearest"),
     [
-        ('Pmax=? [F<=5 "goal"]', "F with a bound", 'Pmax=? [F "goal"]'),
-        ("Pmin=? [F<=K (x=2)]", "F with a bound", "Pmin=? [F x = 2]"),
-        ("Pmax=? [F[1,K+3] busy]", "F with a bound", "Pmax=? [F busy]"),
-        ("Pmax=? [F<=max(2,K) x=1]", "F with a bound", "Pmax=? [F x = 1]"),
-        ("Pmax=? [F<=2*(K+1) x=1]", "F with a bound", "Pmax=? [F x = 1]"),
-        ("Pmax=? [G>K-1 !busy]", "G with a bound", "Pmin=? [F busy]"),
-        ("Pmax=? [busy U<= 3 // steps\n x=1]", "U with a bound", "Pmax=? [busy U x = 1]"),
-        ('Pmax=? [F^{rew{"u"}>=5} busy]', "F with a bound", "Pmax=? [F busy]"),
-        ('Pmax=? [true Urew{"u"}>=5 (x = 0)]', "U with a bound", "Pmax=? [true U x = 0]"),
-        ('Pmax=? [busy Usteps<=200 "goal"]', "U with a bound", 'Pmax=? [busy U "goal"]'),
-        ('Pmax>=0.9 [busy U<=7 "goal"]', "U with a bound", 'Pmax=? [busy U "goal"]'),
-        ("Pmax=? [G<=7 busy]", "G with a bound", "Pmin=? [F !busy]"),
+        ("Pmax=? [G>K-1 !busy]", "G, W or R without a bound", "Pmin=? [F>=2 busy]"),
+        ('Pmax=? [F^{rew{"cost"}>=5} busy]', "F with a bound on a reward", "Pmax=? [F busy]"),
+        ('Pmax=? [true Urew{"cost"}>=5 (x = 0)]', "U with a bound on a reward", "Pmax=? [true U (x = 0)]"),
+        (
+            'Pmax=? [F{"cost"}<=5 (busy & F<=3 "goal")]',
+            "F with a bound on a reward",
+            'Pmax=? [F (busy & (F<=3 "goal"))]',
+        ),
         ('R{"cost"}max=? [Csteps<=200]', "C with a bound", "[F "),
         ('R{"cost"}max=? [C<=200]', "C with a bound", "[F "),
         ('R{"cost"}max=? [C]', "C (a reward that adds up without end)", "[F "),
@@ -135,16 +225,24 @@ def test_without_decisions_min_and_max_need_not_be_said() -> None:
         ('LRAmax=? ["goal"]', "A long-run average", "[F "),
         ('Pmax=? [G !"h"]', "G (always)", 'Pmin=? [F "h"]'),
         ("Pmin=? [G x<2]", "G (always)", "Pmax=? [F !(x < 2)]"),
-        ('Pmax=? [X "goal"]', "X (after one step)", 'Pmax=? [F "goal"]'),
         ('Pmax=? [busy W "goal"]', "W (weak until)", 'Pmin=? [busy & !"goal" U !busy & !"goal"]'),
         ('Pmax=? [busy R "goal"]', "R (release)", 'Pmin=? [!busy U !"goal"]'),
-        ('Pmax=? [G F "goal"]', "A formula of linear temporal logic", 'Pmax=? [F "goal"]'),
-        ('Pmax=? [(G !"h") & (F "goal")]', "A formula of linear temporal logic", 'Pmax=? [F "goal"]'),
-        ('Pmax=? [F "h" & F "goal"]', "A formula of linear temporal logic", 'Pmax=? [F "goal"]'),
-        ('Pmax=? [!(F "goal")]', "A formula of linear temporal logic", 'Pmax=? [F "goal"]'),
-        ('Pmin=? ["h" & !G<=3 !"goal"]', "A formula of linear temporal logic", 'Pmin=? [F "goal"]'),
-        ('R{"cost"}min=? [F "h" & X "goal"]', "A formula of linear temporal logic", 'R{"cost"}min=? [F "goal"]'),
-        ('Pmax=? [busy U "h" U "goal"]', "A formula of linear temporal logic", 'Pmax=? [F "goal"]'),
+        ('Pmax=? [G F "goal"]', "G over a temporal operator", 'Pmax=? [F "goal"]'),
+        ('Pmax=? [(G !"h") & (F "goal")]', "G, W or R without a bound", 'Pmax=? [!"h" U "goal"]'),
+        ('Pmax=? [!(F "goal")]', "G, W or R without a bound", 'Pmin=? [F "goal"]'),
+        ('Pmax=? [!(busy U "goal")]', "G, W or R without a bound", 'Pmin=? [busy U "goal"]'),
+        ('Pmax=? [F (busy & (G "h"))]', "G, W or R without a bound", 'Pmax=? [F (busy & (G<=100 "h"))]'),
+        (
+            'Pmax=? [!((G busy) => F "goal") & F "h"]',
+            "G, W or R",
+            'Pmax=? [!((G<=100 busy) => (F<=100 "goal")) & (F "h")]',
+        ),
+        ('Pmax=? [!(F (busy & (F "goal")))]', "G, W or R without a bound", 'Pmin=? [F (busy & (F "goal"))]'),
+        ('Pmax=? [(busy W "h") & (F "goal")]', "G, W or R without a bound", "Pmax=? [("),
+        ('R{"cost"}min=? [F "h" & X "goal"]', "A reward until a formula of linear", 'R{"cost"}min=? [F "goal"]'),
+        ('Tmin=? [F<=3 (F "goal")]', "A reward until a formula of linear", 'Tmin=? [F "goal"]'),
+        ('Pmax=? [Fsure "goal"]', "Fsure", 'Pmax=? [F "goal"]'),
+        ('Pmax=? [F "h" & Fsure "goal"]', "Fsure", "Pmax=? [F "),
         ('Pmax=? [F P>=0.5 [F "goal"]]', "A property inside a property", "[F "),
         ('Pmax=? [F busy & Rmin<=3 [F "goal"]]', "A property inside a property", "[F "),
         ('Pmax=? [E [F "goal"] U busy]', "A property inside a property", "[F "),
@@ -201,6 +299,28 @@ def test_what_cannot_be_explained_is_refused_by_name_with_its_nearest(text: str,
         ('Pmax=? [F "goal]', "at column 11, got a quotation mark that is never closed"),
         ("Pmax=? [F max(x, 1 > 1]", "must have ',' or '\\)' at column 23, got '\\]'"),
         ('R{1}min=? [F "goal"]', "the name of a reward in quotation marks.* at column 3"),
+        ('Pmax=? [busy U "h" U "goal"]', "put brackets around one of them.* at column 20"),
+        ('Pmax=? [(busy U<=3 "h" W "goal")]', "put brackets around one of them.* at column 24"),
+        ('Pmax=? [F<=-1 "goal"]', "a whole number from 0 to 1000000000, got -1 in 'F<=-1'"),
+        ('Pmax=? [F<=1.5 "goal"]', "a whole number from 0 to 1000000000, got 1.5 in 'F<=1.5'"),
+        ('Pmax=? [F<=p "goal"]', "a whole number from 0 to 1000000000, got 0.25 in 'F<=p'"),
+        ('Pmax=? [F<=1e99 "goal"]', "a whole number from 0 to 1000000000, got 1e\\+99"),
+        ('Pmax=? [F<=0/0 "goal"]', "a whole number from 0 to 1000000000, got nan"),
+        ('Pmax=? [F<=x "goal"]', "a number or a constant of the source, got 'x'"),
+        ('Pmax=? [F<=M "goal"]', "a number or a constant of the source, got 'M'"),
+        ('Pmax=? [F<=busy "goal"]', "a number or a constant of the source, got 'busy'"),
+        ('Pmax=? [F<0 "goal"]', "must leave at least step 0, got 'F<0'. Say F<=0"),
+        ('Pmax=? [F[5,2] "goal"]', "must not end before it begins, got 'F\\[5,2\\]'"),
+        ('Pmax=? [Fsteps "goal"]', "A bound on steps must be said, as in F<=10, got 'Fsteps'"),
+        ('Pmax=? [X<=3 "goal"]', "X must have no bound, got 'X<=3'. After k steps: F\\[k,k\\]"),
+        ("Pmax=? [F<=3]", "A name must be .* got 'F'. The operator F needs an operand behind it"),
+        ('Pmax=? [F[1,] "goal"]', "The bound of F\\[1,\\] '' must have a number"),
+        ('Pmax=? [Xsteps<=3 "goal"]', "X must have no bound, got 'Xsteps<=3'"),
+        ('Pmax=? [F ("h" & (F x))]', "must be true or false, but 'x' is a number"),
+        ('Pmax=? [F ("h" & (F "gaol"))]', "one of the model's: 'goal', 'h'.* got 'gaol'"),
+        ('Pmax=? [(F "goal") = (F "h")]', "A temporal operator must stand in a truth value"),
+        ("Pmax=? [F<=3 (F " + "(" * 900 + "busy" + ")" * 900 + ")]]", "got ']'"),
+        ("Pmax=? [" + "X (" * 1200 + "busy" + ")" * 1200 + "]", "nested too deeply"),
         ('P>=1.5 [F "goal"]', "must lie between 0 and 1, got 1.5"),
         ('P>=-1 [F "goal"]', "must lie between 0 and 1, got -1"),
         ('R{"cost"}<=-1 [F "goal"]', "must be finite and at least 0, got -1"),
@@ -246,7 +366,7 @@ def test_a_truth_value_may_bear_the_name_of_an_operator(name: str) -> None:
     assert parse_property(f"Pmax=? [F {name}]", odd) == ReachAvoid(goal=name)
 
 
-@given(st.text(alphabet='PRTminax=?[]{}"goalhxbusy FGUX!&|<>0123().;:/\n', max_size=40))
+@given(st.text(alphabet='PRTminax=?[]{}"goalhxbusy FGUXW!&|<>0123().,-;:/\n', max_size=40))
 def test_any_text_is_read_or_refused_in_a_sentence(text: str) -> None:
     try:
         read = parse_property(text, PROBLEM)

@@ -47,7 +47,7 @@ def test_an_ambiguous_grammar_would_be_found(caplog: pytest.LogCaptureFixture, m
 
 def test_the_grammar_names_exactly_the_refusals_of_the_table() -> None:
     named = {rule.alias for rule in fresh("property").rules if rule.origin.name.startswith("no_")}
-    assert named == set(REFUSED)
+    assert named == set(REFUSED) - {"total"}  # the property itself tells whether a sum without end is discounted
 
 
 @pytest.mark.parametrize("kind", GRAMMARS)

@@ -21,6 +21,7 @@ from ratherthan.explain.explanation import (
     Tally,
 )
 from ratherthan.explain.question import question
+from ratherthan.explain.schema import OBJECTIVES as RECORDED
 from ratherthan.factors import Interval
 from ratherthan.model.lexicon import Lexicon
 from ratherthan.narrate import narrate
@@ -35,10 +36,31 @@ OBJECTIVES = {
     "probability": ObjectiveRecord(kind="probability", maximise=True),
     "safety": ObjectiveRecord(kind="safety", maximise=True),
     "risk": ObjectiveRecord(kind="risk"),
+    "reward": ObjectiveRecord(kind="reward", reward="reward", maximise=True),
+    "least-reward": ObjectiveRecord(kind="reward", reward="loss"),
+    "least-risk": ObjectiveRecord(kind="cost", reward="risk"),
+    "collisions": ObjectiveRecord(kind="cost", reward="collisions"),
+    "meetings": ObjectiveRecord(kind="cost", reward="chance_meetings"),
+    "weighted": ObjectiveRecord(kind="cost", reward="distance + 10 * risk"),
+    "discounted": ObjectiveRecord(kind="discounted", reward="reward", maximise=True, discount=0.9),
+    "least-discounted": ObjectiveRecord(kind="discounted", discount=0.9),
+    "deadline": ObjectiveRecord(kind="deadline", maximise=True),
+    "mission": ObjectiveRecord(kind="mission", maximise=True),
+    "event": ObjectiveRecord(kind="event", formula='!"lost" U "home"'),
 }
 COSTS = {"distance": 10.6667, "better": 6.6667, "other": 7.25}
+REWARDS = {"distance": -7.25, "better": -3.04, "other": 0.002}
 CHANCES = {"distance": 0.5, "better": 0.8, "other": 0.75}
 FATES = (None, "dead end", "may fail")
+
+
+def numbers_of(record: ObjectiveRecord) -> dict[str, float]:
+    return CHANCES if record.chance else COSTS if record.kind == "cost" else REWARDS if record.maximise else COSTS
+
+
+def fated(record: ObjectiveRecord) -> bool:
+    """Whether infinite numbers may mean that it does not arrive."""
+    return record.kind in ("cost", "reward")
 
 
 def measured(action: str, value: float, fate: str | None = None) -> Measured:
@@ -70,7 +92,7 @@ def step(*claims: Claim, **more: object) -> Step:
     return Step(state=10, choice=0, choice_index=0, action="east", claims=claims, **more)  # type: ignore[arg-type]
 
 
-def outcome_claims(numbers: dict[str, float], *, chance: bool) -> dict[str, list[Claim]]:
+def outcome_claims(numbers: dict[str, float], *, fates: bool) -> dict[str, list[Claim]]:
     own, better, other = numbers["distance"], numbers["better"], numbers["other"]
     south, north = measured("south", better), measured("north", other)
     claims = {
@@ -78,11 +100,11 @@ def outcome_claims(numbers: dict[str, float], *, chance: bool) -> dict[str, list
         "best": [claim("best", measured("east", better), measured("south", own))],
         "among the best": [claim("among the best", measured("east", better), measured("south", better))],
         "right start only": [claim("right start only", measured("east", better), measured("south", own))],
-        "hopeless": [claim("hopeless", measured("east", own, None if chance else "may fail"))],
+        "hopeless": [claim("hopeless", measured("east", own, "may fail" if fates else None))],
         "better step": [claim("better step", measured("east", better), measured("south", own))],
         "equal step": [claim("equal step", measured("east", better), measured("south", better))],
     }
-    for name, fate in itertools.product(("not best", "worse step"), FATES[:1] if chance else FATES):
+    for name, fate in itertools.product(("not best", "worse step"), FATES if fates else FATES[:1]):
         called = f"{name}, {fate or 'finite'}"
         claims[f"{called}, one alternative"] = [claim(name, measured("east", own, fate), south)]
         claims[f"{called}, several alternatives"] = [claim(name, measured("east", own, fate), south, north)]
@@ -101,16 +123,17 @@ def flexibility_claims() -> dict[str, list[Claim]]:
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_every_combination_of_claims_has_its_words(objective: str, golden: Callable[[str, str], None]) -> None:
     record = OBJECTIVES[objective]
-    chance = record.kind != "cost"
     lines = []
     for (outcome, first), (flexibility, second) in itertools.product(
-        outcome_claims(CHANCES if chance else COSTS, chance=chance).items(), flexibility_claims().items()
+        outcome_claims(numbers_of(record), fates=fated(record)).items(), flexibility_claims().items()
     ):
+        if record.kind == "discounted" and outcome == "hopeless":
+            continue  # never claimed: there is nowhere to arrive
         lines.append(f"{outcome}; {flexibility}: {explained(record, step(*first, *second))}")
     golden(f"sentences/{objective}.txt", "\n".join(lines) + "\n")
 
 
-def contrasts(numbers: dict[str, float], *, chance: bool) -> dict[str, list[Claim]]:
+def contrasts(numbers: dict[str, float], *, fates: bool, lost: bool) -> dict[str, list[Claim]]:
     low, high = measured("east", numbers["better"]), measured("south", numbers["distance"])
     lowered, raised = measured("south", numbers["better"]), measured("east", numbers["distance"])
     claims = {
@@ -119,8 +142,10 @@ def contrasts(numbers: dict[str, float], *, chance: bool) -> dict[str, list[Clai
         "worse": [claim("worse", raised, lowered)],
         "equal": [claim("equal", low, lowered)],
     }
-    if chance:
+    if lost:
         return claims | {"equal, lost": [claim("equal", measured("east", 0.0), measured("south", 0.0))]}
+    if not fates:
+        return claims
     for fate in FATES[1:]:
         claims[f"better, {fate}"] = [claim("better", low, measured("south", 0, fate))]
         claims[f"worse, {fate}"] = [claim("worse", measured("east", 0, fate), lowered)]
@@ -140,11 +165,11 @@ def test_every_contrast_with_a_foil_has_its_words(golden: Callable[[str, str], N
         "as flexible": [claim("as flexible", two("east"), two("south"))],
     }
     lines = []
-    for name in ("distance", "energy", "probability", "safety", "risk"):
+    for name in ("distance", "energy", "probability", "safety", "risk", "reward", "discounted", "mission", "event"):
         record = OBJECTIVES[name]
-        chance = record.kind != "cost"
+        lost = record.chance and record.kind != "event"
         for (outcome, first), (flexibility, second) in itertools.product(
-            contrasts(CHANCES if chance else COSTS, chance=chance).items(), tallies.items()
+            contrasts(numbers_of(record), fates=fated(record), lost=lost).items(), tallies.items()
         ):
             text = explained(record, step(*first, *second, foil="south"))
             lines.append(f"{name}; {outcome}; {flexibility}: {text}")
@@ -155,8 +180,8 @@ def test_single_steps_judged_by_the_policy_are_said_as_such(golden: Callable[[st
     lines = []
     for name in ("distance", "probability"):
         record = OBJECTIVES[name]
-        chance = record.kind != "cost"
-        for outcome, claims in contrasts(CHANCES if chance else COSTS, chance=chance).items():
+        chance = record.chance
+        for outcome, claims in contrasts(numbers_of(record), fates=fated(record), lost=chance).items():
             text = explained(record, step(*claims, foil="south"), policy_values=True)
             lines.append(f"{name}; {outcome}: {text}")
         if not chance:
@@ -209,6 +234,7 @@ def test_the_tables_are_complete() -> None:
         "start",
         "hopeless",
         "lost",
+        "endless",
         "step_better",
         "step_equal",
         "step_hopeless",
@@ -221,7 +247,12 @@ def test_the_tables_are_complete() -> None:
     assert set(templates["contrasts"]) == {"better", "avoids", "worse", "equal", "open"}
     assert all(set(row) == {"more", "fewer", "same", "unsaid"} for row in templates["contrasts"].values())
     words = {"best", "best_flexible", "among", "better", "worse", "equal", "noun"}
-    assert all(set(table) == words for kinds in templates["objectives"].values() for table in kinds.values())
+    words |= {"best_one", "among_one", "better_one", "worse_one", "endless", "unit", "amount"}
+    for tables in (templates["objectives"], templates["rewards"]):
+        assert all(set(table) == words for kinds in tables.values() for table in kinds.values())
+    ways = {"arrive", "arrive_at_all", "there"}
+    assert all(set(table) == ways for table in templates["arriving"].values())
+    assert set(templates["objectives"]) == set(RECORDED) - {"cost", "reward"}
 
 
 @pytest.mark.parametrize(

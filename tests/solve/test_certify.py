@@ -13,6 +13,7 @@ import pytest
 from exact import optimum_by_enumeration
 from random_models import OBJECTIVES, Table, problem_of, random_problem
 
+from ratherthan.model.objective import ExpectedReward
 from ratherthan.model.policy import Policy
 from ratherthan.model.problem import Problem
 from ratherthan.solve import Outcome, evaluate, optimum, solve
@@ -20,6 +21,7 @@ from ratherthan.solve.certify import (
     Parts,
     Tight,
     chain_bounds,
+    fits,
     never_falls,
     never_rises,
     nowhere_negative,
@@ -85,6 +87,26 @@ def test_a_bound_for_one_policy_is_none_for_all() -> None:
 def test_a_vector_below_0_is_no_upper_bound_of_a_largest_value() -> None:
     assert not nowhere_negative(Parts(np.array([-1e-20]), np.zeros(1)), np.zeros(1))
     assert nowhere_negative(Parts(np.array([1e-20]), np.zeros(1)), np.zeros(1))
+
+
+def test_without_rounding_only_the_exact_solution_fits() -> None:
+    table: Table = {
+        0: {"on": ([(1.0, 1)], 3), "slip": ([(0.5, 1), (0.5, 0)], -1)},
+        1: {"on": ([(1.0, 2)], -4)},
+        2: {"stay": ([(1.0, 2)], 0)},
+    }
+    objective = ExpectedReward(goal='"goal"', reward="cost")
+    task = task_of(goal_of(problem_of(table, objective, goals=[2]), objective))
+    _, whole, _ = optimum._systems(task)
+    assert fits(whole, np.array([-1.0, -4.0]), -1.0)
+    assert not fits(whole, np.array([-1.0, -4.0]), 1.0), "slipping is worse"
+    assert not fits(whole, np.nextafter([-1.0, -4.0], -np.inf), -1.0)
+    assert not fits(whole, np.array([-1.0, np.nextafter(-4.0, 0.0)]), -1.0)
+    for value in (np.nan, inf, -inf):
+        with np.errstate(invalid="ignore"):
+            assert not fits(whole, np.array([value, -4.0]), -1.0)
+    inexact = replace(whole, exact=np.zeros(whole.rows, dtype=bool))
+    assert not fits(inexact, np.array([-1.0, -4.0]), -1.0)
 
 
 def test_nan_and_infinity_pass_no_check() -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from ratherthan.errors import PropertyError
 from ratherthan.io import read
-from ratherthan.model.objective import Threshold
+from ratherthan.model.objective import Mission, Threshold
 from ratherthan.model.property import parse_property
 from ratherthan.solve import Outcome, solve
 
@@ -49,6 +49,8 @@ def test_published_values_lie_within_the_bounds(model: dict[str, Any], shared_da
             assert "<=" in text or ">=" in text, "only bounded properties are refused"
             continue
         objective = wanted.objective if isinstance(wanted, Threshold) else wanted
+        if isinstance(objective, Mission) and problem.mdp.branches > LARGE:
+            continue  # its product has as many times the branches as there are steps to be counted
         solution = solve(problem, objective)
         assert solution.outcome is Outcome.CERTIFIED
         lower, upper = float(solution.lower[0, start]), float(solution.upper[0, start])

@@ -13,8 +13,9 @@ from ratherthan.model.mdp import MDP, Reward
 from ratherthan.model.objective import ExpectedCost, ReachAvoid
 from ratherthan.model.problem import Problem
 from ratherthan.verify import candidates, sweeps
+from ratherthan.verify.aims import frame_of
 from ratherthan.verify.candidates import Budget
-from ratherthan.verify.frame import Frame, frame_of
+from ratherthan.verify.frame import Frame
 from ratherthan.verify.values import following, optimum
 
 EXACT, SWEPT = Budget(exact=1000), Budget(exact=0)

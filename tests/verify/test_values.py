@@ -12,9 +12,10 @@ import pytest
 from random_models import OBJECTIVES, random_policy, random_problem
 
 from ratherthan.model.mdp import MDP
+from ratherthan.verify.aims import frame_of
 from ratherthan.verify.candidates import Budget
 from ratherthan.verify.exact import eliminate, row_of
-from ratherthan.verify.frame import Frame, frame_of
+from ratherthan.verify.frame import Frame
 from ratherthan.verify.values import Band, following, optimum
 
 EXACT, SWEPT = Budget(), Budget(exact=0)

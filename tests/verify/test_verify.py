@@ -128,6 +128,7 @@ FORGED: dict[str, Callable[[Document], object]] = {
     "a number beyond numbers": lambda d: d["steps"][0].__setitem__("share", 10**400),
     "a place of fractions": lambda d: d["states"]["5"].__setitem__("place", [0.5, 1]),
     "a tolerance that makes all equal": lambda d: d.update(tolerance=0.5),
+    "a tolerance that makes much equal": lambda d: d.update(tolerance=0.01),
     "another kind": lambda d: d.update(kind="selective"),
     "another outcome": lambda d: d.update(outcome="All is well."),
     "another property": lambda d: d.update(property='Pmax=? [F "destination"]'),

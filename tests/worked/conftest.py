@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ratherthan import MDP, ExpectedCost, Lexicon, Policy, Problem, Reward, Solu
 from ratherthan.factors import constrictiveness, critical_states, responsibility
 
 Branches = Sequence[tuple[float, str]]
-Table = Mapping[str, Mapping[str, tuple[Branches, float]]]
+Table = Mapping[str, Mapping[str, tuple[Branches, float | Mapping[str, float]]]]
 
 LEAST_COST = ExpectedCost(goal='"goal"', reward="cost")
 
@@ -28,11 +29,12 @@ def build(
     objective: Any = LEAST_COST,
     start: str | None = None,
     lexicon: Lexicon | None = None,
+    labels: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Problem:
     """Return the problem that a readable table says.
 
     ``{state: {action: ([(probability, target)], cost)}}``, states and actions in order; a state with an empty table stays
-    where it is for nothing. The first state is the start.
+    where it is for nothing. The first state is the start. In place of a cost several rewards can be named.
     """
     names = list(table)
     number = {name: i for i, name in enumerate(names)}
@@ -46,8 +48,8 @@ def build(
         branch_to_probability=np.array([chance for _, branches, _ in flat for chance, _ in branches], dtype=float),
         choice_to_action=np.array([actions.index(action) for action, _, _ in flat]),
         actions=actions,
-        labels={"goal": _among(names, goal), "hazard": _among(names, hazard)},
-        rewards={"cost": Reward(choice=np.array([cost for _, _, cost in flat], dtype=float))},
+        labels={"goal": _among(names, goal), "hazard": _among(names, hazard), **_among_all(names, labels)},
+        rewards=_rewards([cost for _, _, cost in flat]),
         initial=np.array([number[start or names[0]]]),
         names=StateNames(count=len(names), strings=names),
     )
@@ -57,6 +59,17 @@ def build(
 def _among(names: list[str], wanted: str | Sequence[str]) -> np.ndarray:
     wanted = [wanted] if isinstance(wanted, str) else wanted
     return np.array([name in wanted for name in names])
+
+
+def _among_all(names: list[str], labels: Mapping[str, Sequence[str]]) -> dict[str, np.ndarray]:
+    return {label: _among(names, wanted) for label, wanted in labels.items()}
+
+
+def _rewards(given: Sequence[float | Mapping[str, float]]) -> dict[str, Reward]:
+    """Return the rewards by choice: those that are named, else "cost"."""
+    named = list(dict.fromkeys(name for paid in given if isinstance(paid, Mapping) for name in paid)) or ["cost"]
+    rows = [paid if isinstance(paid, Mapping) else dict.fromkeys(named, paid) for paid in given]
+    return {name: Reward(choice=np.array([row.get(name, 0.0) for row in rows], dtype=float)) for name in named}
 
 
 @dataclass
@@ -132,6 +145,17 @@ def told() -> Callable[..., str]:
         solution = rt.solve(problem) if policy is None else rt.evaluate(problem, policy)
         details = {"state": problem.mdp.names.find(state)} if at else {}
         return rt.narrate(rt.explain(solution, kind=kind, **details))
+
+    return text
+
+
+@pytest.fixture(scope="session")
+def explained() -> Callable[..., str]:
+    """Return a function: a Problem and the details of a question become the text."""
+
+    def text(problem: Problem, policy: Policy | None = None, **details: Any) -> str:
+        solution = rt.solve(problem) if policy is None else rt.evaluate(problem, policy)
+        return rt.narrate(rt.explain(solution, **details))
 
     return text
 

@@ -33,9 +33,9 @@ MOST_LISTED = 20
 def value_document(solution: Solution, wish: Objective | Threshold) -> dict[str, Any]:
     """Return the value at the start with its bounds; of a yes-or-no property, whether it holds.
 
-    The bounds are those of the number, also where the value is true, false or null (undecided); null where not proved.
+    The bounds are those of the number, also where the value is true, false or null (undecided); null where not proved. Of
+    several objectives in order they are those of the first; ``levels`` has all.
     """
-    from ratherthan.explain.record import number
     from ratherthan.model.objective import Threshold
     from ratherthan.model.states import start_of
 
@@ -45,18 +45,33 @@ def value_document(solution: Solution, wish: Objective | Threshold) -> dict[str,
         if solution.given
         else (solution.values, solution.lower, solution.upper)
     )
-    lower, upper = float(lowers[0, start]), float(uppers[0, start])
-    value = number(float(values[0, start]))
-    return {
-        "value": decided(wish, lower, upper) if isinstance(wish, Threshold) else value,
-        "lower": None if lower == -float("inf") < upper else number(lower),
-        "upper": None if upper == float("inf") > lower else number(upper),
+    levels = [
+        {"property": level.text} | _bounded(float(values[k, start]), float(lowers[k, start]), float(uppers[k, start]))
+        for k, level in enumerate(solution.objectives)
+    ]
+    first = {key: levels[0][key] for key in ("value", "lower", "upper")}
+    if isinstance(wish, Threshold):
+        first["value"] = decided(wish, float(lowers[0, start]), float(uppers[0, start]))
+    document = {
+        **first,
         "states": mdp.states,
         "choices": mdp.choices,
         "branches": mdp.branches,
         "outcome": solution.outcome.name.lower().replace("_", " "),
         "message": solution.outcome.value,
         "engine": solution.engine,
+    }
+    return document | ({"levels": levels} if len(levels) > 1 else {})
+
+
+def _bounded(value: float, lower: float, upper: float) -> dict[str, Any]:
+    """Return a value with its bounds as a document has them, null where nothing is proved."""
+    from ratherthan.explain.record import number
+
+    return {
+        "value": number(value),
+        "lower": None if lower == -float("inf") < upper else number(lower),
+        "upper": None if upper == float("inf") > lower else number(upper),
     }
 
 
@@ -72,7 +87,7 @@ def decided(wish: Threshold, lower: float, upper: float) -> bool | None:
     return True if surely else False if never else None
 
 
-def value_lines(document: Mapping[str, Any], wish: Objective | Threshold) -> Iterator[str]:
+def value_lines(document: Mapping[str, Any], text: str) -> Iterator[str]:
     """Yield a value for people."""
     value = document["value"]
     spelled = {True: "true", False: "false", None: "undecided"}[value] if isinstance(value, bool | None) else value
@@ -80,15 +95,22 @@ def value_lines(document: Mapping[str, Any], wish: Objective | Threshold) -> Ite
     sizes = ", ".join(f"{document[key]} {key}" for key in ("states", "choices", "branches"))
     yield from _pairs(
         {
-            "property": one_line(wish.text),
+            "property": one_line(text),
             "value": str(spelled),
             "lower": str(bounds[0]),
             "upper": str(bounds[1]),
+            **{f"level {k}": _level_text(level) for k, level in enumerate(document.get("levels", [])[1:], 2)},
             "model": sizes,
             "outcome": document["message"],
             "engine": document["engine"],
         }
     )
+
+
+def _level_text(level: Mapping[str, Any]) -> str:
+    """Return the value of a further level with its bounds and property."""
+    lower, upper = ("not proved" if level[key] is None else level[key] for key in ("lower", "upper"))
+    return f"{level['value']} (between {lower} and {upper}): {one_line(level['property'])}"
 
 
 def _pairs(table: Mapping[str, str]) -> Iterator[str]:

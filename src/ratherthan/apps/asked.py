@@ -27,24 +27,45 @@ def problem_of(wanted: Wanted) -> Problem:
     from ratherthan.io import read
 
     with waiting(f"Reading {wanted.source}"):
-        problem = read(wanted.source, constants=wanted.constants, start=wanted.start)
+        problem = read(wanted.source, constants=wanted.constants, start=wanted.start, properties=wanted.properties)
     if wanted.lexicon is None:
         return problem
-    from ratherthan.apps.words import read_lexicon
+    from ratherthan.apps.door import say
+    from ratherthan.apps.words import read_lexicon, strangers
+    from ratherthan.model.lexicon import Lexicon
 
-    return replace(problem, lexicon=read_lexicon(wanted.lexicon, problem.lexicon))
+    lexicon = read_lexicon(wanted.lexicon, problem.lexicon)
+    note = strangers(read_lexicon(wanted.lexicon, Lexicon()), problem.mdp)
+    if note:
+        say(note)
+    return replace(problem, lexicon=lexicon)
 
 
-def answer_of(wanted: Wanted, *, policy: str | None, minimise_q: bool) -> tuple[Solution, Objective | Threshold]:
-    """Return the solution of what is wanted, and the property itself: it may be a yes-or-no question."""
-    from ratherthan.model.objective import Threshold
+def answer_of(wanted: Wanted, *, policy: str | None, minimise_q: bool) -> tuple[dict[str, Any], str]:
+    """Return the document of the value that is wanted, and the text of the property; Storm's where it is not ours to give."""
+    from ratherthan.apps.answers import value_document
+    from ratherthan.apps.elsewhere import asked_of_storm, storm_document
+    from ratherthan.errors import NotExplainableError, PropertyError
+    from ratherthan.model.objective import Lexicographic, Threshold
     from ratherthan.model.states import start_of
 
     problem = problem_of(wanted)
-    wish = _wish(wanted, problem)
-    start_of(problem.mdp)
-    problem = replace(problem, objective=wish.objective if isinstance(wish, Threshold) else wish)
-    return _solved(problem, policy, minimise_q=minimise_q), wish
+    text = wanted.properties[0] if len(wanted.properties) == 1 and wanted.discount is None else None
+    reason: PropertyError
+    try:
+        wish = _wish(wanted, problem)
+    except PropertyError as error:
+        reason = error
+    else:
+        start_of(problem.mdp)
+        objective = wish.objective if isinstance(wish, Threshold) else wish
+        try:
+            solution = _solved(replace(problem, objective=objective), policy, minimise_q=minimise_q)
+            return value_document(solution, wish), wish.text
+        except NotExplainableError as error:
+            reason, text = error, None if isinstance(wish, Lexicographic) else wish.text
+    answer = asked_of_storm(problem, text, reason, policy)
+    return storm_document(answer, problem), answer.text
 
 
 def explanation_of(wanted: Wanted, given: Mapping[str, Any]) -> Explanation:
@@ -57,7 +78,9 @@ def explanation_of(wanted: Wanted, given: Mapping[str, Any]) -> Explanation:
     if state is None:
         start_of(problem.mdp)
     asked = _question(given, None if state is None else state_number(problem.mdp, state))
-    return explain(_solved(problem, given["policy"], minimise_q=given["minimise_q"]), asked=asked)
+    solution = _solved(problem, given["policy"], minimise_q=given["minimise_q"])
+    with waiting("Explaining"):
+        return explain(solution, asked=asked, also=given["also"])
 
 
 def factor_table_of(wanted: Wanted, given: Mapping[str, Any]) -> dict[str, Column]:
@@ -78,30 +101,40 @@ def factor_table_of(wanted: Wanted, given: Mapping[str, Any]) -> dict[str, Colum
 
 def _wish(wanted: Wanted, problem: Problem) -> Objective | Threshold:
     """Return what is wanted: the property that was given, else the one that the source makes plain."""
-    from ratherthan.errors import PropertyError
-    from ratherthan.model.property import choose_objective
+    from ratherthan.model.property import choose_objective, lexicographic
 
-    if len(wanted.properties) > 1:
-        raise PropertyError(
-            f"One property must be given at a time, got {len(wanted.properties)}. Give --property once."
-        )
-    return choose_objective(problem, wanted.properties[0] if wanted.properties else None)
+    wishes = [choose_objective(problem, text, discount=wanted.discount) for text in wanted.properties or (None,)]
+    return wishes[0] if len(wishes) == 1 else lexicographic(wishes)
 
 
 def _explainable(wanted: Wanted) -> Problem:
-    """Return the problem with an objective that has a best value."""
-    from ratherthan.errors import PropertyError
-    from ratherthan.model.objective import Threshold
+    """Return the problem with an objective that has a best value, unfolded with what must be remembered for it."""
+    from ratherthan.errors import NotExplainableError
 
     problem = problem_of(wanted)
-    wish = _wish(wanted, problem)
+    try:
+        return _with_objective(problem, _wish(wanted, problem))
+    except NotExplainableError as error:
+        raise NotExplainableError(f"{error.message} ratherthan solve can give its value.", **error.place) from error
+
+
+def _with_objective(problem: Problem, wish: Objective | Threshold) -> Problem:
+    from ratherthan.errors import PropertyError
+    from ratherthan.model.objective import Mission, Threshold, levels_of
+
     if isinstance(wish, Threshold):
         raise PropertyError(
             f"A property must ask for a best value (=?) to be explained, got the yes-or-no question '{wish.text}'. "
             f"Ask for '{wish.objective.text}'; the question itself is answered by: ratherthan solve.",
             text=wish.text,
         )
-    return replace(problem, objective=wish)
+    problem = replace(problem, objective=wish)
+    if not any(isinstance(level, Mission) for level in levels_of(wish)):
+        return problem
+    from ratherthan.solve.solver import unfolded_for
+
+    with waiting("Unfolding the mission"):
+        return replace(unfolded_for(problem, wish), objective=wish)
 
 
 def _question(given: Mapping[str, Any], state: int | None) -> Question:
@@ -136,4 +169,11 @@ def _solved(problem: Problem, policy: str | None, *, minimise_q: bool) -> Soluti
             return solve(problem, progress=tell)
         from ratherthan.io.policies import read_policy
 
-        return evaluate(problem, read_policy(policy, problem.mdp, minimise_q=minimise_q), progress=tell)
+        unfolding = problem.unfolding  # a policy is given for the model as it is, whatever must be remembered
+        mdp = problem.mdp if unfolding is None else unfolding.origin.mdp
+        chosen = read_policy(policy, mdp, minimise_q=minimise_q)
+        if unfolding is not None:
+            from ratherthan.model.product import lifted
+
+            chosen = lifted(chosen, problem)
+        return evaluate(problem, chosen, progress=tell)

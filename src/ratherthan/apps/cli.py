@@ -12,7 +12,7 @@ from ratherthan.apps.options import Command
 
 __all__ = ["COMMANDS", "Ratherthan", "main", "run"]
 
-COMMANDS = ("explain", "factors", "solve", "verify", "info", "convert", "examples", "completion")
+COMMANDS = ("explain", "factors", "solve", "tradeoffs", "verify", "info", "convert", "examples", "completion")
 
 
 class Ratherthan(Door):

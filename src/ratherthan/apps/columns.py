@@ -48,7 +48,10 @@ class Column:
 
 
 def factor_columns(factors: Factors, states: Iterable[int] | None) -> dict[str, Column]:
-    """Return the columns of `KEYS`.
+    """Return the columns of `KEYS`, and for objectives in order those of the further levels: ``action_value_2`` and so on.
+
+    ``compared_2`` tells which choices the second level compares, those equal to the best at the first; the extremes and the
+    responsibility of a further level are among these, and null for all others.
 
     Parameters
     ----------
@@ -78,7 +81,35 @@ def factor_columns(factors: Factors, states: Iterable[int] | None) -> dict[str, 
         "constrictiveness": Column(values=counts, null=unknown),
         "critical": Column(values=critical.certain[state], null=(critical.possible & ~critical.certain)[state]),
         "taken": Column(values=solution.policy.weights(mdp) > 0),
+        **_further_levels(factors, state),
     }
+
+
+def _further_levels(factors: Factors, state: npt.NDArray[np.int64]) -> dict[str, Column]:
+    """Return the columns of the levels after the first."""
+    found: dict[str, Column] = {}
+    starts = factors.solution.problem.mdp.state_to_choices[:-1]
+    for k, measures in enumerate(factors.levels[1:], start=1):
+        certain, possible = factors.compared[k]
+        open_ = np.logical_or.reduceat(certain != possible, starts)[state]
+        apart = open_ | ~certain
+        value = measures.action_value
+        low = np.minimum.reduceat(np.where(certain, value, np.inf), starts)[state]
+        high = np.maximum.reduceat(np.where(certain, value, -np.inf), starts)[state]
+        with np.errstate(invalid="ignore"):
+            share = np.where((value == low) | factors.ended[k][state], 0.0, value - low)
+        columns = {
+            "impact": Column(values=measures.impact),
+            "action_value": Column(values=value),
+            "lower": Column(values=measures.lower, null=np.isneginf(measures.lower) & ~np.isneginf(measures.upper)),
+            "upper": Column(values=measures.upper, null=np.isposinf(measures.upper) & ~np.isposinf(measures.lower)),
+            "compared": Column(values=certain, null=certain != possible),
+            "lambda_min": Column(values=np.where(apart, 0.0, low), null=apart),
+            "lambda_max": Column(values=np.where(apart, 0.0, high), null=apart),
+            "responsibility": Column(values=np.where(apart, 0.0, share), null=apart),
+        }
+        found |= {f"{name}_{k + 1}": column for name, column in columns.items()}
+    return found
 
 
 def _counts(

@@ -71,11 +71,13 @@ class Wanted:
     source : str
     properties : tuple of str
         As often as ``--property`` was given.
+    discount : float, optional
     constants, start, lexicon : str, optional
     """
 
     source: str
     properties: tuple[str, ...] = ()
+    discount: float | None = None
     constants: str | None = None
     start: str | None = None
     lexicon: str | None = None
@@ -100,8 +102,16 @@ _SOURCE: Mapping[str, Callable[[F], F]] = {
         metavar="TEXT",
         multiple=True,
         show_default=False,
-        help="What is wanted, in PRISM's syntax or by the name it has in the source.  [default: the source's own, or the "
+        help="What is wanted, in PRISM's syntax, by the name it has in the source, or FILE.props:NAME; given again, what comes "
+        "second.  [default: the source's own, or the "
         "least of its one reward until goal, target or destination]",
+    ),
+    "discount": option(
+        "--discount",
+        section="Source",
+        type=float,
+        metavar="G",
+        help="The discount of a sum without end, -p 'R{\"reward\"}max=? [C]': between 0 and 1.",
     ),
     "constants": option(
         "--constants", section="Source", metavar="N=5,K=2", help="Values for constants of a PRISM or JANI model."

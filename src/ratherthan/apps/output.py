@@ -87,13 +87,22 @@ def send(parts: Iterable[str | bytes], output: str | None = None) -> None:
     if output is None or output == "-":
         _to_standard_output(chunks)
     elif Path(output).exists() and not Path(output).is_file() and not Path(output).is_dir():
-        with Path(output).open("wb") as device:  # a device or a pipe cannot be replaced by a file
-            device.writelines(chunks)
+        _to_device(output, chunks)
     else:
         from ratherthan.io._files import write_atomically
 
         with write_atomically(Path(output).resolve()) as file:
             file.writelines(chunks)
+
+
+def _to_device(output: str, chunks: Iterable[bytes]) -> None:
+    """Write to a device or a pipe, which a file cannot replace."""
+    try:
+        with Path(output).open("wb") as device:
+            device.writelines(chunks)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise SourceError(f"The output must be writable, but '{output}' is not: {reason}.", path=output) from error
 
 
 def _to_standard_output(chunks: Iterable[bytes]) -> None:

@@ -6,10 +6,11 @@ import csv
 import io
 import json
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from ratherthan.apps.columns import KEYS, Column, blocks
+from ratherthan.apps.columns import Column, blocks
 from ratherthan.apps.door import one_line
 from ratherthan.errors import MissingExtraError
 
@@ -28,7 +29,11 @@ def parts_of(form: str, columns: Mapping[str, Column]) -> Iterator[str] | Iterat
 
 def table_parts(columns: Mapping[str, Column]) -> Iterator[str]:
     """Yield a table for people, block by block; a column is as wide as its first block needs."""
-    keys = [key for key in KEYS if key not in EXACT and not (key == "state_name" and not _named(columns[key]))]
+    keys = [
+        key
+        for key in columns
+        if re.sub(r"_\d+$", "", key) not in EXACT and not (key == "state_name" and not _named(columns[key]))
+    ]
     widths: list[int] = []
     for first, last in blocks(_count(columns)):
         cells = [[shown(value, key) for value in columns[key].rows(first, last)] for key in keys]
@@ -47,7 +52,7 @@ def aligned(cells: Sequence[str], widths: Sequence[int]) -> str:
 def shown(value: object, key: str = "") -> str:
     """Return a value as the table for people shows it: six digits, yes and no, nothing for null but in `critical`."""
     if value is None:
-        return "open" if key == "critical" else ""
+        return "open" if key == "critical" or key.startswith("compared") else ""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:.6g}" if isinstance(value, float) else one_line(str(value))
@@ -59,8 +64,8 @@ def json_parts(columns: Mapping[str, Column]) -> Iterator[str]:
     encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
     before = "\n  "
     for first, last in blocks(_count(columns)):
-        parts = [list(map(_json_value, columns[key].rows(first, last))) for key in KEYS]
-        rows = [encode(dict(zip(KEYS, row, strict=True))) for row in zip(*parts, strict=True)]
+        parts = [list(map(_json_value, column.rows(first, last))) for column in columns.values()]
+        rows = [encode(dict(zip(columns, row, strict=True))) for row in zip(*parts, strict=True)]
         if rows:
             yield before + ",\n  ".join(rows)
             before = ",\n  "
@@ -79,8 +84,8 @@ def csv_parts(columns: Mapping[str, Column]) -> Iterator[str]:
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
         if first == 0:
-            writer.writerow(KEYS)
-        parts = [list(map(_csv_value, columns[key].rows(first, last))) for key in KEYS]
+            writer.writerow(columns)
+        parts = [list(map(_csv_value, column.rows(first, last))) for column in columns.values()]
         writer.writerows(zip(*parts, strict=True))
         yield buffer.getvalue()
 
@@ -110,10 +115,10 @@ def parquet_parts(columns: Mapping[str, Column]) -> Iterator[bytes]:
 
     count = _count(columns)
     buffer = pa.BufferOutputStream()
-    schema = pa.schema([(key, _parquet_type(key, pa)) for key in KEYS])
+    schema = pa.schema([(key, _parquet_type(key, pa)) for key in columns])
     with parquet.ParquetWriter(buffer, schema) as writer:
         for first, last in blocks(count, 1 << 17):
-            arrays = [_parquet_array(columns[key], schema.field(key).type, first, last, pa) for key in KEYS]
+            arrays = [_parquet_array(columns[key], schema.field(key).type, first, last, pa) for key in columns]
             writer.write_table(pa.table(arrays, schema=schema))
     yield buffer.getvalue().to_pybytes()
 
@@ -123,7 +128,7 @@ def _parquet_type(key: str, pa: Any) -> Any:
         return pa.int64()
     if key in ("state_name", "action"):
         return pa.string()
-    return pa.bool_() if key in ("critical", "taken") else pa.float64()
+    return pa.bool_() if key in ("critical", "taken") or key.startswith("compared") else pa.float64()
 
 
 def _parquet_array(column: Column, kind: Any, first: int, last: int, pa: Any) -> Any:

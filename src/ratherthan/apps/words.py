@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 import unicodedata
 from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from ratherthan.errors import SourceError
-from ratherthan.model.lexicon import Lexicon
+from ratherthan.errors import QuestionError, SourceError
+from ratherthan.model.lexicon import OBJECTIVE_WORDS, Lexicon
 
-__all__ = ["lexicon_from", "read_lexicon"]
+if TYPE_CHECKING:
+    from ratherthan.model.mdp import MDP
+
+__all__ = ["lexicon_from", "read_lexicon", "strangers"]
 
 TEXTS = ("language", "state")
 TABLES = ("actions", "gerunds", "states")
-OBJECTIVE_WORDS = ("best", "best_flexible", "among", "better", "worse", "equal", "noun")
+PLACEHOLDER = re.compile(r"\{([^{}]*)\}")
+PLACEHOLDERS = ("number", "name")
+MOST_LISTED = 5
 
 
 def read_lexicon(path: str, beneath: Lexicon) -> Lexicon:
@@ -36,7 +42,7 @@ def read_lexicon(path: str, beneath: Lexicon) -> Lexicon:
     """
     from ratherthan.io._files import open_source
 
-    with open_source(path) as file:
+    with open_source(path, "a lexicon") as file:
         try:
             table = tomllib.loads(file.read().decode("utf-8-sig"))
         except UnicodeDecodeError as error:
@@ -56,6 +62,9 @@ def lexicon_from(table: Mapping[str, Any], path: str, beneath: Lexicon) -> Lexic
     for key in TEXTS:
         if key in table:
             given[key] = _text(table[key], path, key)
+    for placeholder in PLACEHOLDER.findall(given.get("state", "")):
+        if placeholder not in PLACEHOLDERS:
+            _fail(path, f"'state' may have the placeholders {{number}} and {{name}}, got '{{{placeholder}}}'.")
     for key in TABLES:
         if key in table:
             given[key] = {**getattr(beneath, key), **_texts(table[key], path, key)}
@@ -66,6 +75,26 @@ def lexicon_from(table: Mapping[str, Any], path: str, beneath: Lexicon) -> Lexic
             _check_keys(_table(words, path, where), OBJECTIVE_WORDS, path, where)
             given["objectives"][name] = {**beneath.objectives.get(name, {}), **_texts(words, path, where)}
     return replace(beneath, **given)
+
+
+def strangers(lexicon: Lexicon, mdp: MDP) -> str:
+    """Return a sentence on the actions and states of a lexicon that a model does not have, empty where it has them all."""
+    unknown = [f"action '{name}'" for name in {**lexicon.actions, **lexicon.gerunds} if name not in mdp.actions]
+    unknown += [f"state '{name}'" for name in lexicon.states if not _is_state(name, mdp)]
+    if not unknown:
+        return ""
+    more = f" and {len(unknown) - MOST_LISTED} more" if len(unknown) > MOST_LISTED else ""
+    return f"The lexicon has words for what the model does not have: {', '.join(unknown[:MOST_LISTED])}{more}."
+
+
+def _is_state(name: str, mdp: MDP) -> bool:
+    from ratherthan.model.states import state_number
+
+    try:
+        state_number(mdp, name)
+    except QuestionError:
+        return False
+    return True
 
 
 def _check_keys(table: Mapping[str, Any], known: Collection[str], path: str, what: str) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ratherthan.explain.explanation import Claim, Evidence, Explanation, Measured, Step, Tally
+from ratherthan.explain.explanation import Claim, Evidence, Explanation, Judged, Measured, Step, Tally, Trade
 from ratherthan.explain.question import FACTORS, KINDS, Question, question
 
 if TYPE_CHECKING:
-    from ratherthan.explain.explainer import Factors, explain, initial_state
+    from ratherthan.explain.explainer import explain, initial_state
+    from ratherthan.explain.measures import Factors
 
 __all__ = [
     "FACTORS",
@@ -17,10 +18,12 @@ __all__ = [
     "Evidence",
     "Explanation",
     "Factors",
+    "Judged",
     "Measured",
     "Question",
     "Step",
     "Tally",
+    "Trade",
     "explain",
     "initial_state",
     "question",
@@ -29,7 +32,11 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Load what needs the solver only when it is asked for: a stored explanation is narrated without it."""
-    if name in ("Factors", "explain", "initial_state"):
+    if name == "Factors":
+        from ratherthan.explain.measures import Factors
+
+        return Factors
+    if name in ("explain", "initial_state"):
         from ratherthan.explain import explainer
 
         return getattr(explainer, name)

@@ -2,47 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from ratherthan.errors import PolicyError, QuestionError
-from ratherthan.explain.claims import Judge
-from ratherthan.explain.explanation import (
-    Closing,
-    Explanation,
-    ObjectiveRecord,
-    PolicyRecord,
-    StateRecord,
-    Step,
-)
+from ratherthan.explain.claims import flexibility, flexibility_against
+from ratherthan.explain.explanation import Claim, Closing, Explanation, Step, Trade
+from ratherthan.explain.further import View, further_objectives, views_of
+from ratherthan.explain.levels import Judges
+from ratherthan.explain.measures import Factors
+from ratherthan.explain.obstacles import in_the_way
 from ratherthan.explain.question import Question, question
-from ratherthan.explain.route import PolicyGraph, Route, policy_graph, reachable_at_all, route_from
-from ratherthan.factors import (
-    Constrictiveness,
-    Criticality,
-    Interval,
-    Responsibility,
-    constrictiveness,
-    critical_states,
-    nearer_goal,
-    responsibility,
-)
-from ratherthan.model.objective import ExpectedCost, Objective, ReachAvoid
+from ratherthan.explain.recording import recorded
+from ratherthan.explain.route import PolicyGraph, Route, policy_graph, route_from
+from ratherthan.explain.trades import trade_of
+from ratherthan.factors import Interval
+from ratherthan.model.objective import Level, Objective
 from ratherthan.solve.solution import Solution
 from ratherthan.solve.solver import arrival
 
-__all__ = ["Factors", "explain", "initial_state"]
+__all__ = ["explain", "initial_state"]
 
 MOST_NAMED = 20
 """How many states of a circle are named in the data."""
 
 
 def explain(
-    solution: Solution, kind: str | None = None, *, asked: Question | None = None, **details: Any
+    solution: Solution,
+    kind: str | None = None,
+    *,
+    also: Iterable[str | Objective] = (),
+    asked: Question | None = None,
+    **details: Any,
 ) -> Explanation:
     """Explain a solution's policy.
 
@@ -53,6 +46,9 @@ def explain(
     kind : str, optional
         One of the seven kinds: "none", "naive-state", "responsibility", "constrictive", "naive-path", "selective",
         "contrastive" (the default).
+    also : iterable of str or objective
+        Further objectives under which the plan and its alternatives are judged: objectives, properties, names of the
+        source's own properties, or names of rewards, which mean the least of it until the goal of the plan's objective.
     asked : Question, optional
         A question made before; then neither `kind` nor `details` may be given.
     **details
@@ -69,12 +65,16 @@ def explain(
         If the question does not fit the model: an unknown action or state, several initial states and none chosen.
     PolicyError
         If the policy says nothing at the state asked about.
+    PropertyError
+        If a further objective cannot be read, asks yes or no, has levels or memory, or stands twice.
     """
     if asked is None:
         asked = question(kind, **details)
     elif kind is not None or details:
         raise QuestionError("Give either a question or its parts, got both.")
-    return _Explainer(solution=solution, asked=asked).explanation()
+    if isinstance(also, str):
+        also = (also,)
+    return _Explainer(solution=solution, asked=asked, also=further_objectives(solution, also)).explanation()
 
 
 def initial_state(solution: Solution) -> int:
@@ -98,59 +98,22 @@ def initial_state(solution: Solution) -> int:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Factors:
-    """The factors of a solution under one question, computed on first use and shared."""
-
-    solution: Solution
-    asked: Question
-
-    @cached_property
-    def measures(self) -> Responsibility:
-        """Impact, action values and responsibility of every choice."""
-        return responsibility(self.solution, policy_values=self.asked.policy_values)
-
-    @cached_property
-    def critical(self) -> Criticality:
-        """The critical states."""
-        return critical_states(
-            self.solution.problem.mdp,
-            self.measures,
-            self.solution.ended,
-            alpha=self.asked.alpha,
-            omega=self.asked.omega,
-            tolerance=self.asked.tolerance,
-        )
-
-    def counts(self, choices: Iterable[int]) -> dict[int, Constrictiveness]:
-        """Return how many decisions each of `choices` leaves open."""
-        solution = self.solution
-        if self.asked.policy_values:
-            lower, upper = solution.policy_lower[0], solution.policy_upper[0]
-        else:
-            lower, upper = solution.lower[0], solution.upper[0]
-        toward = nearer_goal(lower, upper, maximise=solution.objectives[0].maximise, tolerance=self.asked.tolerance)
-        return constrictiveness(
-            self.solution.problem.mdp,
-            self.critical,
-            self.solution.ended,
-            choices,
-            search=self.asked.search,
-            nearer=toward if self.asked.search.toward_goal else None,
-        )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class _Explainer:
     solution: Solution
     asked: Question
+    also: tuple[Level, ...]
 
     @cached_property
     def factors(self) -> Factors:
         return Factors(solution=self.solution, asked=self.asked)
 
     @cached_property
-    def judge(self) -> Judge:
-        return Judge(solution=self.solution, measures=self.factors.measures, asked=self.asked)
+    def judges(self) -> Judges:
+        return Judges(factors=self.factors)
+
+    @cached_property
+    def views(self) -> tuple[View, ...]:
+        return views_of(self.solution, self.also) if self.also else ()
 
     @cached_property
     def graph(self) -> PolicyGraph:
@@ -197,24 +160,27 @@ class _Explainer:
             circle=route.circle[:MOST_NAMED],
             circle_size=len(route.circle),
             circle_certain=route.certain,
-            in_the_way=self._in_the_way(start) if route.outcome == "no way" else (),
+            in_the_way=in_the_way(self.solution, start) if route.outcome == "no way" else (),
+            totals=tuple(view.value(start) for view in self.views),
             steps=steps,
             closing=self._closing(route, steps),
         )
 
     def _steps(self, route: Route) -> tuple[Step, ...]:
         """Return the steps of a route; claims only where a sentence may be said of them."""
-        selective = "selectiveness" in self.asked.factors
-        steps = []
-        for state, choice in zip(route.states, route.choices, strict=False):
-            told = not selective or self.factors.critical.of(state) is not False
-            share = float(self.solution.policy.weights(self.solution.problem.mdp)[choice]) if self._random else 1.0
-            steps.append(self._step(state, choice, share, told=told))
-        return tuple(steps)
-
-    @property
-    def _random(self) -> bool:
-        return self.solution.policy.chance is not None
+        selective, mdp, chance = (
+            "selectiveness" in self.asked.factors,
+            self.solution.problem.mdp,
+            self.solution.policy.chance,
+        )
+        rows = list(zip(route.states, route.choices, strict=False))
+        told = {state: not selective or self.factors.critical.of(state) is not False for state, _ in rows}
+        if "constrictiveness" in self.asked.factors:
+            self.factors.counts(other for state, _ in rows if told[state] for other in mdp.choices_of(state))
+        return tuple(
+            self._step(state, choice, 1.0 if chance is None else float(chance[choice]), told=told[state])
+            for state, choice in rows
+        )
 
     def _taken(self, state: int) -> list[tuple[int, float]]:
         """Return the choices the policy takes in a state, with their shares, the most frequent first."""
@@ -234,18 +200,10 @@ class _Explainer:
         return taken[:1]
 
     def _step(self, state: int, choice: int, share: float, *, told: bool) -> Step:
-        mdp, factors = self.solution.problem.mdp, self.asked.factors
-        selective = "selectiveness" in factors
-        claims = []
+        mdp = self.solution.problem.mdp
+        selective = "selectiveness" in self.asked.factors
         foil = None if self.asked.rather_than is None else self._foil(state, choice)
-        if foil is not None:
-            counts = self.factors.counts([choice, foil]) if "constrictiveness" in factors else None
-            claims = self.judge.contrast(choice, foil, counts)
-        elif told:
-            if "responsibility" in factors:
-                claims += self.judge.outcome(state, choice)
-            if "constrictiveness" in factors:
-                claims += self.judge.flexibility(state, choice, self.factors.counts(mdp.choices_of(state)))
+        others = [foil] if foil is not None else [c for c in mdp.choices_of(state) if c != choice]
         return Step(
             state=state,
             choice=choice,
@@ -253,10 +211,33 @@ class _Explainer:
             action=mdp.action_name(choice),
             share=share,
             critical=self.factors.critical.of(state) if selective else False,
-            spread=self.judge.spread(state) if selective else None,
-            claims=tuple(claims),
+            spread=self.judges.spread(state) if selective else None,
+            further_spreads=self.factors.further_spreads(state) if selective else (),
+            claims=tuple(self._claims(state, choice, foil)) if told else (),
+            trades=self._trades(state, choice, others) if told else (),
             foil=None if foil is None else mdp.action_name(foil),
         )
+
+    def _claims(self, state: int, choice: int, foil: int | None) -> list[Claim]:
+        """Return the claims of one step."""
+        outcome, counted = "responsibility" in self.asked.factors, "constrictiveness" in self.asked.factors
+        if foil is not None:
+            claims = self.judges.contrast(state, choice, foil) if outcome else []
+            if counted:
+                claims += flexibility_against(self.solution, choice, foil, self.factors.counts([choice, foil]))
+            return claims
+        claims = self.judges.outcome(state, choice) if outcome else []
+        if counted:
+            counts = self.factors.counts(self.solution.problem.mdp.choices_of(state))
+            claims += flexibility(self.solution, state, choice, counts)
+        return claims
+
+    def _trades(self, state: int, choice: int, others: Sequence[int]) -> tuple[Trade, ...]:
+        """Return how the choice taken compares with each of others under all objectives."""
+        if not self.also or "responsibility" not in self.asked.factors:
+            return ()
+        tolerance = self.asked.tolerance
+        return tuple(trade_of(self.views, state, choice, other, tolerance=tolerance) for other in others)
 
     def _foil(self, state: int, choice: int) -> int:
         """Return the choice that the foil names."""
@@ -286,7 +267,7 @@ class _Explainer:
         if "selectiveness" not in self.asked.factors or route.outcome not in ("arrives", "circles", "open end"):
             return Closing()
         untold = sorted({step.state for step in steps if step.critical is False})
-        equal = all(self.judge.equivalent(state) for state in untold)
+        equal = all(self.judges.equivalent(state) for state in untold)
         largest = None if not untold else 0.0 if equal else self._largest_difference(untold)
         reachable = self.graph.reachable(route.states[0])
         reachable[list(route.states)] = False
@@ -299,85 +280,11 @@ class _Explainer:
         )
 
     def _largest_difference(self, untold: list[int]) -> float | None:
-        spreads = [self.judge.difference(state) for state in untold]
+        """Return by how much the untold decisions change the first level at most; None where that is open, or nothing."""
+        spreads = [self.judges.difference(state) for state in untold]
         if not all(number.finite for spread in spreads for number in spread):
             return None
-        return max(high.value - low.value for high, low in spreads)
-
-    def _in_the_way(self, start: int) -> tuple[int, ...]:
-        """Return the hazards on a shortest path to a goal that passes through hazards, if there is such a path."""
-        if not self.solution.hazard.any():
-            return ()
-        mdp = self.solution.problem.mdp
-        before = {start: -1}
-        layer = [start]
-        while layer:
-            following = []
-            for state in layer:
-                first = mdp.choice_to_branches[mdp.state_to_choices[state]]
-                last = mdp.choice_to_branches[mdp.state_to_choices[state + 1]]
-                for target in map(int, mdp.branch_to_target[first:last]):
-                    if target in before:
-                        continue
-                    before[target] = state
-                    if self.solution.goal[target]:
-                        return self._hazards_on(before, target)
-                    following.append(target)
-            layer = following
-        return ()
-
-    def _hazards_on(self, before: dict[int, int], state: int) -> tuple[int, ...]:
-        path = []
-        while state >= 0:
-            path.append(state)
-            state = before[state]
-        return tuple(s for s in reversed(path) if self.solution.hazard[s])
+        return max(high.upper - low.lower for high, low in spreads) or None  # it is a further level that they change
 
     def _record(self, start: int, **parts: Any) -> Explanation:
-        mdp, problem = self.solution.problem.mdp, self.solution.problem
-        steps: tuple[Step, ...] = parts.get("steps", ())
-        mentioned = {start, *parts.get("route", ()), *parts.get("circle", ()), *parts.get("in_the_way", ())}
-        for step in steps:
-            mentioned |= {step.state} | {state for claim in step.claims for state, _, _ in claim.evidence.follows}
-        return Explanation(
-            source=problem.source,
-            property=self.solution.objectives[0].text,
-            objective=_objective_record(self.solution.objectives[0]),
-            question=self.asked,
-            start=start,
-            states={state: self._state_record(state) for state in sorted(mentioned)},
-            size=(mdp.states, mdp.choices, mdp.branches),
-            policy=self._policy_record(mentioned),
-            lexicon=problem.lexicon,
-            outcome=self.solution.outcome.value,
-            **parts,
-        )
-
-    def _state_record(self, state: int) -> StateRecord:
-        problem = self.solution.problem
-        place = None if problem.world is None else problem.world.place(state)
-        return StateRecord(name=problem.mdp.names[state], named=problem.mdp.names.named, place=place)
-
-    def _policy_record(self, mentioned: set[int]) -> PolicyRecord:
-        seen = np.zeros(self.graph.states, dtype=bool)
-        for state in sorted(mentioned):
-            if not seen[state]:  # judged by ρ^π, an alternative rests on what the policy does after it
-                judged = self.asked.policy_values and self.solution.given
-                seen |= reachable_at_all(self.solution, state) if judged else self.graph.reachable(state)
-        mdp = self.solution.problem.mdp
-        weights = self.solution.policy.weights(mdp)
-        state_of_choice = np.repeat(np.arange(mdp.states), np.diff(mdp.state_to_choices))
-        kept = np.flatnonzero((weights > 0) & seen[state_of_choice] & ~self.solution.ended[state_of_choice])
-        return PolicyRecord(
-            given=self.solution.given,
-            choices=tuple((int(state_of_choice[c]), int(c), float(weights[c])) for c in kept),
-        )
-
-
-def _objective_record(objective: Objective) -> ObjectiveRecord:
-    if isinstance(objective, ExpectedCost):
-        return ObjectiveRecord(kind="cost", reward=objective.reward, maximise=objective.maximise)
-    assert isinstance(objective, ReachAvoid)
-    if not objective.maximise:
-        return ObjectiveRecord(kind="risk", maximise=False)
-    return ObjectiveRecord(kind="probability" if objective.through is None else "safety", maximise=True)
+        return recorded(self.solution, self.asked, self.also, self.graph, start, **parts)

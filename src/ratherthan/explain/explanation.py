@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from ratherthan.explain.evidence import Claim, Evidence, Judged, Measured, Tally, Trade
 from ratherthan.explain.question import Question
 from ratherthan.factors import Interval
 from ratherthan.model.lexicon import Lexicon
@@ -19,71 +20,19 @@ __all__ = [
     "Closing",
     "Evidence",
     "Explanation",
+    "Further",
+    "Judged",
     "Measured",
     "ObjectiveRecord",
     "PolicyRecord",
     "StateRecord",
     "Step",
     "Tally",
+    "Trade",
+    "Unfolded",
 ]
 
 VERSION = "1"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Measured:
-    """A choice with its number: the action value q (or ω), with bounds.
-
-    `fate` tells what an infinite expected cost means: ``"dead end"`` where nothing after the action can arrive any more,
-    ``"may fail"`` where it may.
-    """
-
-    choice: int
-    action: str
-    number: Interval
-    fate: str | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Tally:
-    """A choice with its count of decisions left open, ε, between two bounds."""
-
-    choice: int
-    action: str
-    lower: int
-    upper: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class Evidence:
-    """What a claim rests on: the number (or count) of the choice taken, and those of the choices it is compared with.
-
-    `follows` lists, for claims about the rest of the way, each successor with ρ and ρ^π.
-    """
-
-    taken: Measured | Tally
-    others: tuple[Measured | Tally, ...] = ()
-    follows: tuple[tuple[int, Interval, Interval], ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Claim:
-    """One thing that holds of the choice taken, against which actions, and why.
-
-    Parameters
-    ----------
-    claim : str
-        Outcome: "best", "among the best", "right start only", "not best", "hopeless"; judged by single steps: "better
-        step", "equal step", "worse step"; flexibility: "most flexible", "equally flexible"; details: "avoids", "only way
-        on"; against a foil: "better", "worse", "equal", "more flexible", "less flexible", "as flexible".
-    against : tuple of str
-        The actions it is claimed against.
-    evidence : Evidence
-    """
-
-    claim: str
-    against: tuple[str, ...]
-    evidence: Evidence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +53,11 @@ class Step:
     claims : tuple of Claim
     foil : str, optional
         The action asked about ("rather than").
+    further_spreads : tuple of pairs of Interval
+        For each level after the first, the largest and the smallest number among the choices that are equal to the best at
+        all levels before; None where fewer than two are, where that is open, or where it was not asked.
+    trades : tuple of Trade
+        Where further objectives were given: one for the foil, or for each other action of the state.
     """
 
     state: int
@@ -115,6 +69,8 @@ class Step:
     spread: tuple[Interval, Interval] | None = None
     claims: tuple[Claim, ...] = ()
     foil: str | None = None
+    further_spreads: tuple[tuple[Interval, Interval] | None, ...] = ()
+    trades: tuple[Trade, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,8 +91,8 @@ class Closing:
     printed : bool
         Whether a sentence about the untold steps of this route is true and is said.
     largest_difference : float, optional
-        The largest λmax - λmin among the untold steps: 0 if all their choices are equal, None if no step is untold or the
-        bounds leave it open.
+        The largest λmax - λmin among the untold steps: 0 if all their choices are equal (at every level), None if no step
+        is untold or the bounds leave it open. Of the first level only.
     off_route : int
         How many critical states can be reached under the policy, off the route.
     off_route_open : int
@@ -153,13 +109,48 @@ class Closing:
 class ObjectiveRecord:
     """What kind of thing is wanted, so that words can be found for it.
 
-    `kind` is "cost" (an expected total of `reward`; None counts steps), "probability" (to arrive), "safety" (to arrive
-    where there are hazards) or "risk" (a probability to be kept small).
+    Parameters
+    ----------
+    kind : str
+        "cost" (an expected total of `reward`; None counts steps), "reward" (the same, over plans that are sure to arrive and
+        with rewards of any sign), "discounted" (a discounted sum without end), "probability" (to arrive), "safety" (to
+        arrive where there are hazards), "deadline" (to arrive within some steps), "mission" (to do what takes memory to
+        tell), "risk" (of reaching a hazard, to be kept small; also within some steps) or "event" (any other probability to
+        be kept small).
+    reward : str, optional
+    maximise : bool
+    discount : float, optional
+        Of "discounted".
+    formula : str, optional
+        Of "event": what must not happen, a path formula.
     """
 
     kind: str
     reward: str | None = None
     maximise: bool = False
+    discount: float | None = None
+    formula: str | None = None
+
+    @property
+    def chance(self) -> bool:
+        """Whether its numbers are probabilities."""
+        return self.kind not in ("cost", "reward", "discounted")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Further:
+    """An objective beside the plan's own, under which the plan and its alternatives are judged."""
+
+    property: str
+    objective: ObjectiveRecord
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unfolded:
+    """How large the model was before it was unfolded with what must be remembered, and how many memories there are."""
+
+    states: int
+    memories: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,6 +175,7 @@ class Explanation:
     source, property : str
         Where the model came from, and the objective in PRISM's syntax.
     objective : ObjectiveRecord
+        Of the first level.
     question : Question
     start : int
         The state where the route begins, or the state asked about.
@@ -214,6 +206,14 @@ class Explanation:
     lexicon : Lexicon
     outcome : str
         How the values were got, a sentence.
+    levels : tuple of ObjectiveRecord
+        All levels of the objective, `objective` first.
+    also : tuple of Further
+        The objectives given beside it.
+    totals : tuple of Interval
+        For a route with `also`: what the whole plan comes to at the start, under each level and each further objective.
+    unfolded : Unfolded, optional
+        Where the model is the product of another with what must be remembered.
     """
 
     source: str
@@ -236,3 +236,12 @@ class Explanation:
     policy: PolicyRecord = field(default_factory=lambda: PolicyRecord(given=False))
     lexicon: Lexicon = field(default_factory=Lexicon)
     outcome: str = ""
+    levels: tuple[ObjectiveRecord, ...] = ()
+    also: tuple[Further, ...] = ()
+    totals: tuple[Interval, ...] = ()
+    unfolded: Unfolded | None = None
+
+    def __post_init__(self) -> None:
+        """Let an objective without levels be its own only one."""
+        if not self.levels:
+            object.__setattr__(self, "levels", (self.objective,))

@@ -22,8 +22,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from ratherthan.explain.objectives import endless
 from ratherthan.model.mdp import Bools, Floats
-from ratherthan.model.objective import ReachAvoid
 from ratherthan.solve.solution import Solution
 
 __all__ = ["PolicyGraph", "Route", "policy_graph", "reachable_at_all", "route_from"]
@@ -129,7 +129,7 @@ def route_from(solution: Solution, graph: PolicyGraph, start: int) -> Route:
     """
     if solution.ended[start]:
         return Route(states=(start,), choices=(), outcome=_end_of(solution, start), probability=1.0)
-    if _is_risk(solution):
+    if endless(solution.objectives[0]):
         return _without_goal(solution, graph, start)
     if not solution.can_arrive[start]:
         reached = np.flatnonzero(reachable_at_all(solution, start))
@@ -141,14 +141,8 @@ def route_from(solution: Solution, graph: PolicyGraph, start: int) -> Route:
     return _circling(solution, graph, start, reachable)
 
 
-def _is_risk(solution: Solution) -> bool:
-    """Whether the objective is a probability to be kept small: it has no goal to arrive at."""
-    objective = solution.objectives[0]
-    return isinstance(objective, ReachAvoid) and not objective.maximise
-
-
 def _end_of(solution: Solution, state: int) -> str:
-    return "there" if solution.goal[state] and not _is_risk(solution) else "ended"
+    return "there" if solution.goal[state] and not endless(solution.objectives[0]) else "ended"
 
 
 def reachable_at_all(solution: Solution, start: int) -> Bools:

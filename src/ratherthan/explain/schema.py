@@ -7,7 +7,7 @@ from typing import Any
 from ratherthan.explain.explanation import VERSION
 from ratherthan.explain.question import FACTORS
 
-__all__ = ["CLAIMS", "ROUTE_OUTCOMES", "schema"]
+__all__ = ["CLAIMS", "OBJECTIVES", "RELATIONS", "ROUTE_OUTCOMES", "TRADES", "schema"]
 
 CLAIMS = (
     "best",
@@ -29,6 +29,12 @@ CLAIMS = (
     "less flexible",
     "as flexible",
 )
+
+TRADES = ("better on all", "trade", "dominated", "indifferent", "open")
+
+RELATIONS = ("better", "worse", "equal", "open")
+
+OBJECTIVES = (*("cost", "reward", "discounted", "probability", "safety", "deadline", "mission", "risk", "event"),)
 
 ROUTE_OUTCOMES = ("arrives", "there", "ended", "circles", "no way", "open end", "none")
 
@@ -61,7 +67,18 @@ def schema() -> dict[str, Any]:
         {"taken": row, "others": {"type": "array", "items": row}, "follows": follows}, optional=("follows",)
     )
     texts = {"type": "array", "items": _TEXT}
-    claim = _record({"claim": {"enum": list(CLAIMS)}, "against": texts, "evidence": evidence})
+    claim = _record({"claim": {"enum": list(CLAIMS)}, "level": _COUNT, "against": texts, "evidence": evidence})
+    judged = _record(
+        {"objective": _COUNT, "taken": measured, "other": measured, "relation": {"enum": list(RELATIONS)}},
+    )
+    trade = _record(
+        {
+            "claim": {"enum": list(TRADES)},
+            "against": texts | {"minItems": 1, "maxItems": 1},
+            "judged": {"type": "array", "items": judged, "minItems": 2},
+        }
+    )
+    spread = _or_null(_record({"max": interval, "min": interval}))
     step = _record(
         {
             "state": _COUNT,
@@ -71,9 +88,20 @@ def schema() -> dict[str, Any]:
             "action": _TEXT,
             "share": {"type": "number", "exclusiveMinimum": 0, "maximum": 1},
             "critical": {"type": ["boolean", "null"]},
-            "spread": _or_null(_record({"max": interval, "min": interval})),
+            "spread": spread,
+            "further_spreads": {"type": "array", "items": spread},
             "foil": _or_null(_TEXT),
             "claims": {"type": "array", "items": claim},
+            "trades": {"type": "array", "items": trade},
+        }
+    )
+    objective = _record(
+        {
+            "kind": {"enum": list(OBJECTIVES)},
+            "reward": _or_null(_TEXT),
+            "maximise": _FLAG,
+            "discount": _or_null({"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}),
+            "formula": _or_null(_TEXT),
         }
     )
     words = {"type": "object", "additionalProperties": _TEXT}
@@ -85,13 +113,9 @@ def schema() -> dict[str, Any]:
             "version": {"const": VERSION},
             "source": _TEXT,
             "property": _TEXT,
-            "objective": _record(
-                {
-                    "kind": {"enum": ["cost", "probability", "safety", "risk"]},
-                    "reward": _or_null(_TEXT),
-                    "maximise": _FLAG,
-                }
-            ),
+            "objective": objective,
+            "levels": {"type": "array", "items": objective, "minItems": 1},
+            "also": {"type": "array", "items": _record({"property": _TEXT, "objective": objective})},
             "kind": _TEXT,
             "scope": {"enum": ["none", "state", "route"]},
             "factors": {"type": "array", "items": {"enum": list(FACTORS)}, "uniqueItems": True},
@@ -110,6 +134,7 @@ def schema() -> dict[str, Any]:
             "route_probability": _or_null({"type": "number", "minimum": 0, "maximum": 1}),
             "arrival_probability": _or_null({"type": "number", "minimum": 0, "maximum": 1}),
             "arrival_bounds": _or_null(_record(bounds)),
+            "totals": {"type": "array", "items": interval},
             "circle": _STATES,
             "circle_size": _COUNT,
             "circle_certain": _FLAG,
@@ -129,6 +154,7 @@ def schema() -> dict[str, Any]:
                 "additionalProperties": False,
             },
             "model": _record({"states": _COUNT, "choices": _COUNT, "branches": _COUNT}),
+            "unfolded": _or_null(_record({"states": _COUNT, "memories": _COUNT})),
             "policy": _record({"given": _FLAG, "choices": {"type": "array", "items": policy_row}}),
             "lexicon": _record(
                 {

@@ -9,11 +9,13 @@ from ratherthan.factors.constrictiveness import (
     nearer_goal,
     search_tree,
 )
+from ratherthan.factors.levels import Compared, compared_at, critical_states_of_levels
 from ratherthan.factors.responsibility import Responsibility, responsibility
 from ratherthan.factors.selectiveness import Criticality, critical_states
 
 __all__ = [
     "TOLERANCE",
+    "Compared",
     "Comparison",
     "Constrictiveness",
     "Criticality",
@@ -22,8 +24,10 @@ __all__ = [
     "Responsibility",
     "Search",
     "compare",
+    "compared_at",
     "constrictiveness",
     "critical_states",
+    "critical_states_of_levels",
     "nearer_goal",
     "responsibility",
     "search_tree",

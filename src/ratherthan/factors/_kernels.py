@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from ratherthan.model.mdp import Bools, Floats, Ints
 
-__all__ = ["Weight", "tree_weight"]
+__all__ = ["Trees", "Weight", "rooted_weights", "tree_weight"]
 
 Counts = npt.NDArray[np.int64]
 
@@ -73,3 +73,91 @@ def tree_weight(
                 lower += certain[t]
                 upper += possible[t]
     return Weight(lower, upper)
+
+
+class Trees(NamedTuple):
+    """Dominator trees of K roots, forward and backward, with prefix sums of the weights in forward order."""
+
+    roots: Ints  # [K]
+    position: Ints  # [K, S]
+    size: Ints  # [K, S]
+    certain: Counts  # [K, S+1]
+    possible: Counts  # [K, S+1]
+    back_position: Ints  # [K, S]
+    back_size: Ints  # [K, S]
+
+
+def rooted_weights(
+    choices: Counts,
+    states: Counts,
+    rows: tuple[Ints, Ints, Ints, Ints],
+    certain: Counts,
+    possible: Counts,
+    trees: Trees,
+    budget: int,
+) -> tuple[Counts, Counts, int]:
+    """Weigh the search tree of every one of `choices`, of the `states`, with what the trees know already.
+
+    `rows` are choice_to_branches, branch_to_target, and the graph's leaving_from and leaving. A root that can be reached from
+    the choice without its state stands for all that it reaches without it; only the rest is searched. Returns the weights
+    and how many choices were weighed before `budget` visits were spent.
+    """
+    choice_to_branches, branch_to_target, leaving_from, leaving = rows
+    count = len(leaving_from) - 1
+    mark, queue = np.full(count, -1, np.int32), np.zeros(count, np.int32)
+    lower, upper = np.zeros(len(choices), np.int64), np.zeros(len(choices), np.int64)
+    spent = 0
+    for i in range(len(choices)):
+        if spent > budget:
+            return lower, upper, i
+        s = states[i]
+        begin, end = choice_to_branches[choices[i]], choice_to_branches[choices[i] + 1]
+        known, most = -1, -1
+        for k in range(len(trees.roots)):
+            r = trees.roots[k]
+            if r == s:
+                continue
+            total = trees.possible[k, -1]
+            p = trees.position[k, s]
+            if p >= 0:
+                total -= trees.possible[k, p + trees.size[k, s]] - trees.possible[k, p]
+            if total <= most:
+                continue
+            p = trees.back_position[k, s]
+            for b in range(begin, end):
+                u = branch_to_target[b]
+                q = trees.back_position[k, u]
+                if u != s and q >= 0 and (p < 0 or q < p or q >= p + trees.back_size[k, s]):
+                    known, most = k, total
+                    break
+        first, last = -1, -1
+        if known >= 0:
+            p = trees.position[known, s]
+            lower[i], upper[i] = trees.certain[known, -1], most
+            if p >= 0:
+                first, last = p, p + trees.size[known, s]
+                lower[i] -= trees.certain[known, last] - trees.certain[known, first]
+        filled, head = 0, 0
+        mark[s] = i
+        for b in range(begin, end):
+            t = branch_to_target[b]
+            q = trees.position[known, t] if known >= 0 else -1
+            if mark[t] != i and (q < 0 or first <= q < last):
+                mark[t] = i
+                queue[filled] = t
+                filled += 1
+        while head < filled:
+            u = queue[head]
+            head += 1
+            lower[i] += certain[u]
+            upper[i] += possible[u]
+            for e in range(leaving_from[u], leaving_from[u + 1]):
+                t = leaving[e]
+                if mark[t] != i:
+                    q = trees.position[known, t] if known >= 0 else -1
+                    if q < 0 or first <= q < last:
+                        mark[t] = i
+                        queue[filled] = t
+                        filled += 1
+        spent += filled + 1
+    return lower, upper, len(choices)

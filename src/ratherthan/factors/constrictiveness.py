@@ -10,7 +10,8 @@ states reachable from the successors of (s,a) in the graph without s, each count
 
 Where criticality is open the count has two bounds: open states counted, and not counted.
 
-Method: one breadth-first search per choice; a choice costs one pass over the branches it reaches.
+Method: one breadth-first search per choice; a choice costs one pass over the branches it reaches. Where many choices are asked
+about on a large model, what their searches share is counted once (`landmarks`); the counts are the same.
 """
 
 from __future__ import annotations
@@ -24,13 +25,18 @@ import numpy.typing as npt
 
 from ratherthan.factors._kernels import tree_weight
 from ratherthan.factors.compare import TOLERANCE
+from ratherthan.factors.landmarks import landmarks_of, tree_weights
 from ratherthan.factors.selectiveness import Criticality
 from ratherthan.model._kernels import compiled
+from ratherthan.model.index import index_of
 from ratherthan.model.mdp import MDP, Bools, Floats
 
 __all__ = ["Constrictiveness", "Nearer", "Search", "constrictiveness", "nearer_goal", "search_tree"]
 
 States = npt.NDArray[np.int64]
+
+FEW, LITTLE = 40, 1_000_000
+"""Up to how many choices, and up to how many of them times branches, each choice is searched by itself."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,10 +72,21 @@ def nearer_goal(lower: Floats, upper: Floats, *, maximise: bool, tolerance: floa
     tolerance : float
         Values are different, not equal, beyond the factor of τ.
     """
-    finite = np.where(np.isfinite(upper), np.abs(upper), 0.0), np.where(np.isfinite(lower), np.abs(lower), 0.0)
+    sure, maybe = _beyond(lower, upper, tolerance), _beyond(upper, np.maximum(lower, 0.0), tolerance)
     if maximise:  # better is larger
-        return Nearer(tolerance * finite[0] - lower, -upper), Nearer(tolerance * finite[1] - upper, -lower)
-    return Nearer(upper, lower - tolerance * finite[0]), Nearer(lower, upper - tolerance * finite[1])
+        return Nearer(-sure, -upper), Nearer(-maybe, -lower)
+    return Nearer(upper, sure), Nearer(lower, maybe)
+
+
+def _beyond(larger: Floats, size: Floats, tolerance: float) -> Floats:
+    """Return what a number must be below, ``[S]``, to be different from and smaller than `larger`.
+
+    Where both are below 0 the smaller one has the larger absolute value, and τ is a share of that: y < x - τ if and only if
+    y < x / (1 - tolerance). Where x ≥ 0 it is a share of `size`, and any y < 0 differs.
+    """
+    with np.errstate(invalid="ignore"):
+        above = larger - tolerance * np.where(np.isfinite(size), np.abs(size), 0.0)
+    return np.where(larger < 0.0, larger / (1.0 - tolerance), above)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,6 +130,28 @@ def constrictiveness(
     """
     weight = np.diff(mdp.state_to_choices).astype(np.int64)
     certain, possible = weight * critical.certain, weight * critical.possible
+    asked = np.fromiter(choices, dtype=np.int64)
+    if search == Search() and len(asked) > FEW and len(asked) * mdp.branches > LITTLE:
+        known = landmarks_of(mdp, ended, asked)
+        lower, upper = tree_weights(index_of(mdp), known, asked, (certain, possible))
+        return {
+            int(choice): Constrictiveness(lower=int(low), upper=int(high))
+            for choice, low, high in zip(asked, lower, upper, strict=True)
+        }
+    return _searched(mdp, ended, asked, (certain, possible), search=search, nearer=nearer)
+
+
+def _searched(
+    mdp: MDP,
+    ended: Bools,
+    choices: States,
+    weights: tuple[States, States],
+    *,
+    search: Search,
+    nearer: tuple[Nearer, Nearer] | None,
+) -> dict[int, Constrictiveness]:
+    """Count by one search per choice."""
+    certain, possible = weights
     rows = mdp.state_to_choices, mdp.choice_to_branches, mdp.branch_to_target
     mark, queue = np.zeros(mdp.states, dtype=np.int64), np.zeros(mdp.states, dtype=np.int64)
     horizon = -1 if search.horizon is None else search.horizon
@@ -121,7 +160,7 @@ def constrictiveness(
     kernel = compiled(tree_weight, mdp.branches)
     counts = {}
     stamp = 0
-    for choice in choices:
+    for choice in map(int, choices):
         branches = mdp.branches_of(choice)
         own, found = (branches.start, branches.stop), []
         for follow in (sure,) if sure is maybe else (sure, maybe):

@@ -8,7 +8,7 @@ For a choice (s, a), with s' over its branches and ρ the value of a state (Chen
 * action value     q(s,a) = r̄(s,a) + γ · ω(s,a), with the expected immediate reward r̄ that the paper leaves out:
   with unequal action costs ω alone would call an expensive action good
 * extremes         λmax_s, λmin_s = the largest and the smallest of q (on request of ω) over the choices of s
-* responsibility   ζ(s,a) = q(s,a) - λmin_s, where ∞ - ∞ = 0: the action's share in the outcome. For costs small is good,
+* responsibility   ζ(s,a) = q(s,a) - λmin_s, where ∞ - ∞ = 0 (and -∞ + ∞ likewise): the action's share in the outcome. For costs small is good,
   for probabilities and rewards large is good.
 
 Where all actions of a state cost the same and γ = 1, the differences of ω and of q agree. This responsibility is not the
@@ -28,6 +28,7 @@ import numpy as np
 from ratherthan.factors.compare import Interval
 from ratherthan.model.mdp import Floats
 from ratherthan.solve.bellman import action_value_bounds, impact_bounds
+from ratherthan.solve.levels import ended_at
 from ratherthan.solve.solution import Solution
 
 __all__ = ["Responsibility", "responsibility"]
@@ -46,7 +47,7 @@ class Responsibility:
     lambda_min, lambda_max : array of float, ``[S]``
         The extremes of q.
     responsibility : array of float, ``[C]``
-        ζ from q; 0 where the objective has ended.
+        ζ from q; 0 where the objective (of several, that one) has ended.
     """
 
     impact: Floats  # [C]
@@ -93,7 +94,7 @@ def responsibility(solution: Solution, *, objective: int = 0, policy_values: boo
     low = np.repeat(lambda_min, np.diff(mdp.state_to_choices))
     with np.errstate(invalid="ignore"):
         share = np.where(action_value == low, 0.0, action_value - low)
-    share[np.repeat(solution.ended, np.diff(mdp.state_to_choices))] = 0.0
+    share[np.repeat(ended_at(solution, objective), np.diff(mdp.state_to_choices))] = 0.0
     return Responsibility(
         impact=impact,
         impact_lower=impact_lower,

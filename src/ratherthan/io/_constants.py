@@ -13,7 +13,7 @@ from ratherthan.errors import PropertyError, SourceError
 from ratherthan.model.formula import constant
 from ratherthan.model.syntax import Term, parse_formula, text_of
 
-__all__ = ["Constant", "Given", "Value", "chosen_values", "reachable_names", "text_of_value"]
+__all__ = ["Constant", "Given", "Value", "chosen_values", "given_texts", "reachable_names", "text_of_value"]
 
 Value = bool | int | float
 Given = str | Mapping[str, str | Value] | None
@@ -52,7 +52,7 @@ def chosen_values(
     SourceError
         If a needed constant is missing, or one was given that is unknown, already defined, or of another type.
     """
-    given = _texts(constants)
+    given = given_texts(constants)
     by_name = {item.name: item for item in declared}
     values: dict[str, Value] = {}
     for name, text in given.items():
@@ -88,8 +88,8 @@ def chosen_values(
     return values
 
 
-def _texts(constants: Given) -> dict[str, str]:
-    """Return what was given as texts by name."""
+def given_texts(constants: Given) -> dict[str, str]:
+    """Return the constants that were given as texts by name; SourceError for what is not like ``N=5,K=2``."""
     if constants is None:
         return {}
     if not isinstance(constants, str):

@@ -6,8 +6,8 @@ tools pass over them:
 ========================== ============================================================================================
 ``problem.json``           ``version`` (1), ``names`` (true where states have names), ``texts`` (of those below),
                            ``labels`` (of those below), ``world`` (``width``, ``height``, ``kinds``, ``zones``, ``note``,
-                           ``title``), ``objective``, ``properties``, ``definitions``, ``lexicon``, ``notes``; each absent
-                           where there is none
+                           ``title``), ``objective``, ``properties``, ``others``, ``definitions``, ``lexicon``,
+                           ``notes``; each absent where there is none
 ``names-offsets.bin``      where each state's name begins in ``names.bin`` and the last ends, uint64
 ``names.bin``              the names of the states in UTF-8
 ``text-0-offsets.bin`` …,  likewise what the numbers 0, 1, 2 … of each state variable in ``texts`` stand for
@@ -18,8 +18,7 @@ tools pass over them:
 ``label-0.bin`` …          the states of each label in ``labels``, a bit each
 ========================== ============================================================================================
 
-An objective is ``{"kind": "expected-cost", "goal", "reward", "maximise"}`` or ``{"kind": "reach-avoid", "goal", "through",
-"maximise"}``; a threshold is ``{"kind": "threshold", "objective", "relation", "bound"}``.
+How an objective is written is told in `_objectives`.
 """
 
 from __future__ import annotations
@@ -33,10 +32,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ratherthan.errors import SourceError
+from ratherthan.io._objectives import read_objective, read_property, spelled
 from ratherthan.io._strings import PackedStrings, pack_strings
 from ratherthan.model.lexicon import Lexicon
 from ratherthan.model.mdp import MDP, Bools
-from ratherthan.model.objective import ExpectedCost, Objective, ReachAvoid, Threshold
+from ratherthan.model.objective import Objective, Threshold
 from ratherthan.model.problem import Problem
 from ratherthan.model.world import World
 
@@ -45,7 +45,6 @@ __all__ = ["Extras", "packed_extras", "problem_of"]
 Bytes = npt.NDArray[np.uint8]
 VERSION = 1
 MAIN = "problem.json"
-RELATIONS = (">=", ">", "<=", "<")
 
 
 def packed_extras(
@@ -86,9 +85,11 @@ def packed_extras(
         table["world"], more = _world_files(problem.world)
         files |= more
     if problem.objective is not None:
-        table["objective"] = _spelled(problem.objective)
+        table["objective"] = spelled(problem.objective)
     if problem.properties:
-        table["properties"] = {name: _spelled(item) for name, item in problem.properties.items()}
+        table["properties"] = {name: spelled(item) for name, item in problem.properties.items()}
+    if problem.others:
+        table["others"] = dict(problem.others)
     if problem.definitions:
         table["definitions"] = dict(problem.definitions)
     if problem.lexicon != Lexicon():
@@ -124,17 +125,6 @@ def _world_files(world: World) -> tuple[dict[str, Any], dict[str, bytes]]:
         "kind-of-cell.bin": world.kind_of_cell.astype(np.uint8).tobytes(),
     }
     return table, files | {f"zone-{i}.bin": _bits(mask) for i, mask in enumerate(world.zones.values())}
-
-
-def _spelled(item: Objective | Threshold) -> dict[str, Any]:
-    if isinstance(item, Threshold):
-        return {
-            "kind": "threshold",
-            "objective": _spelled(item.objective),
-            "relation": item.relation,
-            "bound": item.bound,
-        }
-    return {"kind": "expected-cost" if isinstance(item, ExpectedCost) else "reach-avoid"} | asdict(item)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,31 +221,6 @@ class Extras:
             title=self._text(table.get("title", ""), "title"),
         )
 
-    def objective(self, value: Any) -> Objective:
-        """Return an objective out of its JSON."""
-        table = self._object(value, "objective")
-        goal = self._text(table.get("goal"), "goal")
-        maximise = table.get("maximise")
-        if not isinstance(maximise, bool):
-            self.fail("true or false at 'maximise'", maximise)
-        if table.get("kind") == "expected-cost":
-            return ExpectedCost(goal=goal, reward=self._maybe_text(table.get("reward"), "reward"), maximise=maximise)
-        if table.get("kind") == "reach-avoid":
-            return ReachAvoid(goal=goal, through=self._maybe_text(table.get("through"), "through"), maximise=maximise)
-        self.fail("'expected-cost' or 'reach-avoid' as the kind of an objective", table.get("kind"))
-
-    def property(self, value: Any) -> Objective | Threshold:
-        """Return an objective or a threshold out of its JSON."""
-        table = self._object(value, "properties")
-        if table.get("kind") != "threshold":
-            return self.objective(table)
-        relation, bound = table.get("relation"), table.get("bound")
-        if relation not in RELATIONS:
-            self.fail(f"one of {', '.join(RELATIONS)} at 'relation'", relation)
-        if isinstance(bound, bool) or not isinstance(bound, int | float) or bound != bound:
-            self.fail("a number at 'bound'", bound)
-        return Threshold(objective=self.objective(table.get("objective")), relation=relation, bound=float(bound))
-
     def lexicon(self) -> Lexicon:
         """Return the words, the default where there are none."""
         if "lexicon" not in self.table:
@@ -282,7 +247,7 @@ class Extras:
     def properties(self) -> dict[str, Objective | Threshold]:
         """Return the properties by name."""
         table = self._object(self.table.get("properties", {}), "properties")
-        return {name: self.property(value) for name, value in table.items()}
+        return {name: read_property(value, self.fail) for name, value in table.items()}
 
     def _object(self, value: Any, key: str) -> dict[str, Any]:
         if not isinstance(value, dict):
@@ -332,8 +297,11 @@ def problem_of(mdp: MDP, extras: Extras, *, source: str, notes: tuple[str, ...])
     return Problem(
         mdp=mdp,
         world=extras.world(mdp.states),
-        objective=None if extras.table.get("objective") is None else extras.objective(extras.table["objective"]),
+        objective=None
+        if extras.table.get("objective") is None
+        else read_objective(extras.table["objective"], extras.fail),
         properties=extras.properties(),
+        others=extras.words("others"),
         definitions=extras.words("definitions"),
         lexicon=extras.lexicon(),
         source=source,

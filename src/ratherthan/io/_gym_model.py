@@ -13,9 +13,8 @@ Entries of one choice that lead to the same state are one branch: probabilities 
 which leaves every expectation as it is.
 
 Labels: ``terminal``; ``goal``, the terminal states that are entered with the largest reward of all terminal states;
-``hazard``, the other terminal states. Let r be the reward of an entry, and M the largest reward on ending, at least 0.
-Where no entry that goes on earns more than 0, the reward structure ``cost`` is -r on entries that go on and M - r on those
-that end: a policy that is sure to end earns M less its expected cost, so the least cost is the largest reward.
+``hazard``, the other terminal states. What an environment wants is the largest reward until an episode ends. Where all that is ever
+earned is one reward for arriving, that is the largest probability to arrive, and is said so.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ import numpy as np
 from ratherthan.io._gym_entries import Numbers, Table
 from ratherthan.io._rows import Rows, with_loops
 from ratherthan.model.mdp import MDP, Bools, Floats, Reward
-from ratherthan.model.objective import ExpectedCost, Objective, ReachAvoid
+from ratherthan.model.objective import ExpectedReward, Objective, ReachAvoid
 
 __all__ = ["Ended", "mdp_of", "objective_of"]
 
@@ -108,25 +107,11 @@ class Ended:
         return {"terminal": self.terminal, "goal": self.goal, "hazard": self.terminal & ~self.goal}
 
     @cached_property
-    def bonus(self) -> float:
-        """M: the largest reward on ending, at least 0."""
-        return float(self.table.reward[self.table.terminated].max(initial=0.0))
-
-    @cached_property
     def only_arrival_pays(self) -> bool:
         """Whether all that is ever earned is one and the same reward above 0, on every entry to a goal."""
         arrives = self.table.terminated & self.goal[self.table.target]
         paid = self.table.reward[arrives]
         return bool(len(paid) and paid.min() == paid.max() > 0 and not self.table.reward[~arrives].any())
-
-    @cached_property
-    def cost(self) -> Floats | None:
-        """The cost of each entry, None where going on may earn something, nothing is paid, or only arrival pays."""
-        reward, ends = self.table.reward, self.table.terminated
-        cost = np.where(ends, self.bonus - reward, 0.0 - reward)
-        if self.only_arrival_pays or not ends.any() or (cost < 0).any() or not cost.any():
-            return None
-        return cost
 
 
 def mdp_of(
@@ -153,20 +138,15 @@ def mdp_of(
     row = np.concatenate([table.state * count + table.action, (loops[:, None] * count + np.arange(count)).ravel()])
     target = np.concatenate([table.target, np.repeat(loops, count)])
     chance = np.concatenate([table.probability, np.ones(len(loops) * count)])
-    structures = ({} if ended.cost is None else {"cost": ended.cost}) | {"reward": table.reward}
     pair, first, inverse = np.unique(row * table.states + target, return_index=True, return_inverse=True)
     order = np.lexsort((first, pair // table.states))  # by choice, and in it as the table lists them
     place = np.empty(len(order), dtype=np.int64)
     place[order] = np.arange(len(order))
     at = place[inverse]  # the branch of each entry
     probability: Floats = np.bincount(at, weights=chance, minlength=len(order)).astype(np.float64)
-    rewards = {}
-    for name, earned in structures.items():
-        paid = np.concatenate([earned, np.zeros(len(loops) * count)])
-        base = paid[first[order]]  # where all entries of a branch earn the same, that is kept to the last bit
-        rewards[name] = Reward(
-            branch=base + np.bincount(at, weights=chance * (paid - base[at]), minlength=len(order)) / probability
-        )
+    paid = np.concatenate([table.reward, np.zeros(len(loops) * count)])
+    base = paid[first[order]]  # where all entries of a branch earn the same, that is kept to the last bit
+    mean = base + np.bincount(at, weights=chance * (paid - base[at]), minlength=len(order)) / probability
     choice_row, branches = np.unique(pair[order] // table.states, return_counts=True)
     rows, notes = with_loops(
         Rows(
@@ -175,7 +155,7 @@ def mdp_of(
             branch_to_target=pair[order] % table.states,
             branch_to_probability=probability,
             choice_to_action=choice_row % count,
-            rewards=rewards,
+            rewards={"reward": Reward(branch=mean)},
         )
     )
     mdp = MDP(
@@ -209,22 +189,20 @@ def _notes(ended: Ended) -> tuple[str, ...]:
         )
     if not ended.terminal.any():
         notes.append("No episode ends: there are no terminal states.")
-    if ended.cost is not None and ended.bonus > 0:
+    elif (table := ended.table).reward[~table.terminated].max(initial=0.0) > 0.0:
         notes.append(
-            f"The reward structure 'cost' is how much an episode's reward falls short of {ended.bonus:g}: the least cost "
-            "until a terminal state is the largest reward."
+            "Going on may pay: where it can be gone on with for ever, the largest reward until an episode ends is infinite. "
+            "A discounted reward is finite: --property 'R{\"reward\"}max=? [C]' --discount 0.99."
         )
     return tuple(notes)
 
 
 def objective_of(ended: Ended) -> Objective | None:
-    """Return the objective whose best policies are those that earn the most until an episode ends, None where there is none.
+    """Return the objective whose best policies are those that earn the most until an episode ends; None where none ends.
 
-    Where only arrival pays, that is the largest probability to arrive; where nothing earns more than 0, the least cost.
+    Where only arrival pays, that is the largest probability to arrive.
     """
     if ended.only_arrival_pays:
         hazards = bool((ended.terminal & ~ended.goal).any())
         return ReachAvoid(goal='"goal"', through='!"hazard"' if hazards else None)
-    if ended.cost is not None and ended.bonus == 0:
-        return ExpectedCost(goal='"terminal"', reward="cost")
-    return None
+    return ExpectedReward(goal='"terminal"', reward="reward") if ended.terminal.any() else None

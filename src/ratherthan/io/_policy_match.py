@@ -20,6 +20,7 @@ __all__ = [
     "are_alike",
     "called",
     "choices_of",
+    "decided_states",
     "first_with",
     "own_choice",
     "policy_of",
@@ -37,6 +38,20 @@ MOST_LISTED = 10
 def state_of_choices(mdp: MDP) -> Numbers:
     """Return the state of every choice, ``[C]``."""
     return np.repeat(np.arange(mdp.states), np.diff(mdp.state_to_choices))
+
+
+def decided_states(mdp: MDP) -> int:
+    """Return up to which state something is to be decided: without the terminal states at the end, which only loop.
+
+    A reader that gives the ends of episodes states of their own puts them there; who learned from the environment has
+    never seen them.
+    """
+    terminal = mdp.labels.get("terminal")
+    if terminal is None:
+        return mdp.states
+    loops = mdp.branch_to_target == np.repeat(state_of_choices(mdp), np.diff(mdp.choice_to_branches))
+    only = np.logical_and.reduceat(loops, mdp.choice_to_branches[mdp.state_to_choices[:-1]]) & terminal
+    return mdp.states - int(np.logical_and.accumulate(only[::-1]).sum())
 
 
 def called(mdp: MDP, state: int) -> str:

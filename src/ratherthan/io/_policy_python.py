@@ -11,7 +11,15 @@ from typing import Any
 import numpy as np
 
 from ratherthan.errors import PolicyError
-from ratherthan.io._policy_match import Numbers, called, choices_of, first_with, policy_of, shown_actions
+from ratherthan.io._policy_match import (
+    Numbers,
+    called,
+    choices_of,
+    decided_states,
+    first_with,
+    policy_of,
+    shown_actions,
+)
 from ratherthan.io._policy_rows import Rows, mapping_rows
 from ratherthan.model.mdp import MDP
 from ratherthan.model.policy import Policy
@@ -82,6 +90,7 @@ def ask_agent(agent: Any, mdp: MDP) -> Policy:
             f"{what} must have the {columns} actions of the model, got {space}. It was trained on another model."
         )
     states = np.flatnonzero(np.diff(mdp.state_to_choices) > 1)
+    states = states[states < int(agent.observation_space.n)]
     actions = np.concatenate(
         [np.zeros(0, dtype=np.int64), *(_predicted(agent, part, what) for part in _parts(states, mdp))]
     )
@@ -94,13 +103,16 @@ def ask_agent(agent: Any, mdp: MDP) -> Policy:
             f"{what} must choose among the actions of {called(mdp, state)}, {shown_actions(mdp, state)}, but it takes {name}.",
             state=state,
         )
+    unseen = np.arange(int(agent.observation_space.n), mdp.states)
+    states, choices = np.concatenate([states, unseen]), np.concatenate([choices, mdp.state_to_choices[unseen]])
     return policy_of(mdp, states, choices, np.full(len(states), np.nan), what, complete=True)
 
 
 def _check_observations(agent: Any, mdp: MDP, what: str) -> None:
     space = agent.observation_space
     count = getattr(space, "n", None)
-    if isinstance(count, int | np.integer) and int(count) == mdp.states and int(getattr(space, "start", 0)) == 0:
+    numbered = isinstance(count, int | np.integer) and int(getattr(space, "start", 0)) == 0
+    if numbered and decided_states(mdp) <= int(count or 0) <= mdp.states:
         return
     raise PolicyError(
         f"{ITSELF.format(states=mdp.states)}, but {what[0].lower()}{what[1:]} observes {space}. Ask it yourself in each state, "

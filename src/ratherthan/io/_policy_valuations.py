@@ -2,7 +2,7 @@
 
 Tools name a state by the values of its variables: ``(x=1,ok=true)``, ``{"x": 1, "ok": true}``, or just ``(1,true)``, in the
 order in which the model declares them. Storm lists truth values before numbers, whatever the order of declaration, and so
-may a model that it built; within each kind the order is the same. So ``(1,true)`` is read kind by kind.
+does a file that it wrote; within each kind the order is the same. So ``(1,true)`` is read kind by kind.
 
 PRISM numbers states in the order of these tuples, which is not the order in which Storm finds them.
 """
@@ -129,7 +129,7 @@ def prism_order(mdp: MDP) -> Numbers | None:
 
     PRISM sorts states by the values of their variables in the order of declaration. A model without variables is taken to
     be numbered by whoever made the policy, too. Where all truth values come before all numbers, the order may be Storm's,
-    and how the model declares them is not known.
+    and how the model declares them is not known; a program in PRISM's language tells it (``in_declared_order``).
     """
     variables = mdp.names.variables
     if mdp.names.strings is not None or not variables:
@@ -138,6 +138,7 @@ def prism_order(mdp: MDP) -> Numbers | None:
     kinds = ["truth" if column.dtype.kind == "b" else "number" for column in columns]
     if any(column.dtype.kind not in "biuf" for column in columns):
         return np.arange(mdp.states)
-    if len(set(kinds)) == 2 and kinds == sorted(kinds, reverse=True):
+    declared = getattr(variables, "in_declared_order", False)
+    if len(set(kinds)) == 2 and kinds == sorted(kinds, reverse=True) and not declared:
         return None
     return np.lexsort(columns[::-1]).astype(np.int64)

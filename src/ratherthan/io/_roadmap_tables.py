@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from ratherthan.errors import PropertyError
 from ratherthan.io._roadmap_text import Document, Keys, closest, quoted_list
-from ratherthan.model.lexicon import Lexicon
-from ratherthan.model.mdp import Bools, Floats
+from ratherthan.model.lexicon import OBJECTIVE_WORDS, Lexicon
+from ratherthan.model.mdp import Bools, Floats, Reward
+from ratherthan.model.weights import canonical_reward
 
 __all__ = ["ACTIONS", "DIRECTIONS", "STANDARD_KINDS", "Kind", "Legend", "cell_number", "words"]
 
@@ -24,7 +26,6 @@ TOP_KEYS = (
     *("title", "note", "success", "drift", "order", "start", "property", "map", "streets"),
     *("kinds", "moves", "costs", "labels", "properties", "words"),
 )
-OBJECTIVE_WORDS = ("best", "best_flexible", "among", "better", "worse", "equal", "noun")
 MOST = 1e300
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -258,8 +259,6 @@ def words(document: Document, cells: int, costs: Collection[str]) -> Lexicon:
         if number in named:
             document.fail(f"A cell must have one name, got a second one for cell {number}.", keys)
         named[number] = phrase
-    objectives = table_of(document, ("words", "objectives"), table)
-    check_keys(document, objectives, (*costs, "steps", "probability", "safety", "risk"), ("words", "objectives"))
     state = text_of(document, ("words", "state"), table.get("state", "grid {number}"))
     _check_state_phrase(document, state)
     return Lexicon(
@@ -268,8 +267,27 @@ def words(document: Document, cells: int, costs: Collection[str]) -> Lexicon:
         gerunds=phrases["gerunds"],
         state=state,
         states=named,
-        objectives={name: _objective_words(document, name, objectives) for name in objectives},
+        objectives=_objectives(document, table, costs),
     )
+
+
+def _objectives(document: Document, table: dict[str, Any], costs: Collection[str]) -> dict[str, dict[str, str]]:
+    """Return the words of the objectives, those of weighted sums of rewards under the sum in its one spelling."""
+    section = table_of(document, ("words", "objectives"), table)
+    single = (*costs, "steps", "probability", "safety", "risk")
+    known = {name: name for name in single if name in section}
+    for name in [name for name in section if name not in known]:
+        try:
+            known[name] = canonical_reward(name, dict.fromkeys(costs, Reward())) or ""
+        except PropertyError as error:
+            document.fail(error.message, ("words", "objectives", name))
+        if not known[name]:
+            check_keys(document, {name: None}, single, ("words", "objectives"))
+        if list(known.values()).count(known[name]) > 1:
+            document.fail(
+                f"An objective must have its words once, got '{known[name]}' twice.", ("words", "objectives", name)
+            )
+    return {known[name]: _objective_words(document, name, section) for name in section}
 
 
 def _objective_words(document: Document, name: str, objectives: dict[str, Any]) -> dict[str, str]:

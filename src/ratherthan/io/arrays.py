@@ -208,7 +208,7 @@ def _reward_parts(rewards: Any) -> dict[str, Reward]:
     if rewards is None:
         return {}
     if isinstance(rewards, Reward):
-        return {"reward": rewards}
+        rewards = {"reward": rewards}
     if not isinstance(rewards, Mapping):
         raise SourceError(
             f"Rewards on compressed rows must be tables of {', '.join(PARTS)}, got {type(rewards).__name__}."
@@ -218,8 +218,7 @@ def _reward_parts(rewards: Any) -> dict[str, Reward]:
     found = {}
     for name, value in rewards.items():
         if isinstance(value, Reward):
-            found[str(name)] = value
-            continue
+            value = {part: getattr(value, part) for part in PARTS if getattr(value, part) is not None}
         if not set(value) <= set(PARTS):
             raise SourceError(
                 f"Reward '{name}' must be a table of {', '.join(PARTS)}, got {', '.join(map(str, value))}."

@@ -2,7 +2,8 @@
 
 Read are MDPs, and DTMCs as MDPs with one choice per state, with their action names, state variables, labels (variables that
 are true or false and transient) and reward structures (other transient ones). Constants become definitions that properties
-may mention. Properties in the file that can be explained come along by name; what is left out is said in the notes.
+may mention. Properties in the file come along by name: those that can be explained, and as texts those that only a model
+checker can answer; what cannot be said in PRISM's syntax is left out. The notes tell of both.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from ratherthan.errors import PropertyError, SourceError
+from ratherthan.errors import NotExplainableError, PropertyError, SourceError
 from ratherthan.io._constants import Constant, Given, Value, chosen_values, text_of_value
 from ratherthan.io._files import open_source
-from ratherthan.io._jani_terms import Vocabulary, property_text, term_of
+from ratherthan.io._jani_properties import property_text
+from ratherthan.io._jani_terms import Vocabulary, term_of
 from ratherthan.io._storm import build, parse_jani
 from ratherthan.model.objective import Objective, Threshold
 from ratherthan.model.problem import Problem
@@ -73,8 +75,8 @@ def read_jani(path: str | os.PathLike[str], *, constants: Given = None) -> Probl
     )
     bodies |= _unchanging(model, problem)
     problem = replace(problem, definitions=_definitions(bodies, values, words))
-    properties, notes = _properties(model, problem, words)
-    return replace(problem, properties=properties, notes=problem.notes + notes)
+    properties, others, notes = _properties(model, problem, words)
+    return replace(problem, properties=properties, others=others, notes=problem.notes + notes)
 
 
 def _parsed(data: bytes, shown: str) -> dict[str, Any]:
@@ -195,16 +197,21 @@ def _definitions(bodies: Mapping[str, Any], values: Mapping[str, Value], words: 
 
 def _properties(
     model: Mapping[str, Any], problem: Problem, words: Vocabulary
-) -> tuple[dict[str, Objective | Threshold], tuple[str, ...]]:
-    """Return the properties that can be explained by name, and a note on every other."""
+) -> tuple[dict[str, Objective | Threshold], dict[str, str], tuple[str, ...]]:
+    """Return the properties that can be explained by name, the texts of others, and a note on every one of these."""
     properties: dict[str, Objective | Threshold] = {}
+    others: dict[str, str] = {}
     notes = []
     for item in _objects(model, "properties"):
-        name = str(item["name"])
+        name, text = str(item["name"]), ""
         try:
-            properties[name] = parse_property(property_text(item.get("expression"), words), problem)
+            text = property_text(item.get("expression"), words)
+            properties[name] = parse_property(text, problem)
+        except NotExplainableError as error:
+            others[name] = text
+            notes.append(f"Property '{name}' of the source can only be solved: {error.message}")
         except PropertyError as error:
             notes.append(f"Property '{name}' of the source was left out: {error.message}")
         except RecursionError:
             notes.append(f"Property '{name}' of the source was left out: it is nested too deeply.")
-    return properties, tuple(notes)
+    return properties, others, tuple(notes)

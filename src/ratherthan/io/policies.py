@@ -18,7 +18,8 @@ agent             with ``predict`` and ``observation_space``, as those of Stable
 States are given by number or exact name; the number wins. Actions are given by the names they are shown with, or by their
 position among the state's choices, counted from 0. Of equal numbers in a Q table the choice listed first in the model is
 taken. In a model whose actions have no names, columns and action numbers mean positions among the state's choices.
-States that are not listed stay open: that is an error only where they are reached. Storm, PRISM, functions and agents need
+States that are not listed stay open: that is an error only where they are reached. An array may end before the terminal states
+at the end of the model that only loop, such as those that a reader adds for the ends of episodes. Storm, PRISM, functions and agents need
 not speak of states with one choice only.
 """
 
@@ -36,6 +37,7 @@ from ratherthan.io._policy_files import Foreign, read_policy_file
 from ratherthan.io._policy_match import (
     called,
     choices_of,
+    decided_states,
     first_with,
     own_choice,
     policy_of,
@@ -121,6 +123,7 @@ def _of_array(array: npt.NDArray[Any], mdp: MDP, what: str, *, minimise_q: bool)
     """Return the policy of a Q table, or of an action per state."""
     if array.dtype.kind not in "iuf":
         raise PolicyError(f"{what} must hold numbers, got {array.dtype}.")
+    array = _with_ends(array, mdp)
     if array.ndim == 1 and array.dtype.kind in "iu":
         return _of_actions(array, mdp, what)
     widest = int(np.diff(mdp.state_to_choices).max())
@@ -141,6 +144,17 @@ def _of_array(array: npt.NDArray[Any], mdp: MDP, what: str, *, minimise_q: bool)
             "Check that it was filled, and that its columns are the model's actions in their order."
         )
     return Policy(choice=_first_best(mdp, state, worth, silent))
+
+
+def _with_ends(array: npt.NDArray[Any], mdp: MDP) -> npt.NDArray[Any]:
+    """Return an array with rows for the terminal states at the end, where it has none: any action, as all of them loop."""
+    if array.ndim not in (1, 2) or not decided_states(mdp) <= len(array) < mdp.states:
+        return array
+    missing = mdp.states - len(array)
+    if array.ndim == 2:
+        return np.concatenate([array, np.zeros((missing, array.shape[1]), dtype=array.dtype)])
+    loop = np.maximum(mdp.choice_to_action[mdp.state_to_choices[len(array) : mdp.states]], 0)
+    return np.concatenate([array, loop.astype(array.dtype)])
 
 
 def _first_best(mdp: MDP, state: npt.NDArray[np.int64], worth: Floats, silent: Bools) -> npt.NDArray[np.int64]:

@@ -35,6 +35,11 @@ _REFUSED = {
 }
 _KEYWORD = re.compile(rf"(?:\A|;|\bend\w+)\s*({'|'.join(_REFUSED)})\b(?!\s*=)")
 _COMMENT = re.compile(r'"[^"\n]*"|//[^\n]*')
+_MODULE = re.compile(
+    r"\bmodule\s+(?P<name>\w+)\s*(?:=\s*(?P<base>\w+)\s*\[(?P<renamed>[^\]]*)\]|(?P<body>.*?))\s*\bendmodule\b",
+    re.DOTALL,
+)
+_VARIABLE = re.compile(r"\b(\w+)\s*:\s*(?=bool\b|\[)")
 _DECLARED = re.compile(
     r"\b(?:const\s+(?:(?:int|double|bool)\b\s*)?|rate\s+|prob\s+)(?P<constant>\w+)\s*(?:=(?P<value>[^;]*))?;"
     r"|\bformula\s+(?P<formula>\w+)\s*=(?P<body>[^;]*);"
@@ -70,7 +75,7 @@ def read_prism(path: str | os.PathLike[str], *, constants: Given = None) -> Prob
         text = file.read().decode("utf-8", errors="replace")
     text = _COMMENT.sub(lambda found: found[0] if found[0][0] == '"' else " ", text)
     _check_kind(text, shown)
-    symbolic = parse_prism(Path(path), shown)
+    symbolic = replace(parse_prism(Path(path), shown), order=_declared_variables(text))
     definitions, body = _definitions(text)
     values = chosen_values(symbolic.constants, constants, needed=reachable_names([body], definitions), shown=shown)
     problem = build(symbolic, values)
@@ -95,3 +100,19 @@ def _definitions(text: str) -> tuple[dict[str, str], str]:
         if body is not None:
             definitions[found["constant"] or found["formula"]] = " ".join(body.split())
     return definitions, _DECLARED.sub(" ", text)
+
+
+def _declared_variables(text: str) -> tuple[str, ...]:
+    """Return the state variables in PRISM's order: global ones, then those of the modules, as they are declared."""
+    found = []
+    by_module: dict[str, list[str]] = {}
+    for module in _MODULE.finditer(text):
+        if module["base"] is None:
+            own = _VARIABLE.findall(module["body"])
+        else:
+            pairs = [pair.partition("=") for pair in module["renamed"].split(",")]
+            renamed = {old.strip(): new.strip() for old, _, new in pairs}
+            own = [renamed.get(name, name) for name in by_module.get(module["base"], [])]
+        by_module[module["name"]] = own
+        found += own
+    return (*_VARIABLE.findall(_MODULE.sub(" ", text)), *found)

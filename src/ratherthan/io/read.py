@@ -24,7 +24,7 @@ from __future__ import annotations
 import importlib
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -108,6 +108,7 @@ def read(
     constants: str | Mapping[str, Any] | None = None,
     objective: str | None = None,
     start: str | int | None = None,
+    properties: Sequence[str] = (),
     **options: Any,
 ) -> Problem:
     """Read a model.
@@ -120,9 +121,12 @@ def read(
     constants : str or mapping, optional
         Values for the constants of a PRISM or JANI model, ``"N=5,K=2"`` or ``{"N": 5, "K": 2}``.
     objective : str, optional
-        What is wanted: a property in PRISM's syntax, or the name of one that comes with the source.
+        What is wanted: a property in PRISM's syntax, the name of one that comes with the source, or one of a file of
+        properties: ``FILE.props`` if it has one, else ``FILE.props:NAME``.
     start : int or str, optional
         The state to start from, a number or an exact name, in place of the model's initial states.
+    properties : sequence of str
+        More texts like `objective`, of which those from files come along in the problem's properties.
     **options
         Handed to the adapter: `limits` of archives, `rewards`, `labels` … of arrays, arguments of an environment.
 
@@ -141,7 +145,7 @@ def read(
     QuestionError
         Where there is no such state to start from.
     """
-    problem = _read(source, constants or None, options)
+    problem = _read_with(source, constants or None, options, (*properties, *([] if objective is None else [objective])))
     if objective is not None:
         from ratherthan.model.property import choose_objective
 
@@ -159,6 +163,18 @@ def read(
         mdp = replace(problem.mdp, initial=np.array([state_number(problem.mdp, start)]))
         problem = replace(problem, mdp=mdp)
     return problem
+
+
+def _read_with(
+    source: Any, constants: str | Mapping[str, Any] | None, options: dict[str, Any], texts: Sequence[str]
+) -> Problem:
+    """Read a source of any kind, with the properties of files that are named."""
+    if not any("." in text and "[" not in text for text in texts):
+        return _read(source, constants, options)
+    from ratherthan.io.props import files_of, read_with_files
+
+    asked = files_of(texts)
+    return read_with_files(lambda given: _read(source, given, options), constants, asked)
 
 
 def _read(source: Any, constants: str | Mapping[str, Any] | None, options: dict[str, Any]) -> Problem:

@@ -38,7 +38,7 @@ OFTEN_RESERVED = "init"
 """Storm calls the initial states so, and refuses a label of that name."""
 
 
-def write_umb(problem: Problem, path: str | os.PathLike[str], *, packing: str = "gzip") -> None:
+def write_umb(problem: Problem, path: str | os.PathLike[str], *, packing: str = "gzip", players: int = 1) -> None:
     """Write a model as an archive of the Unified Markov Binary format, version 1.
 
     Parameters
@@ -48,6 +48,8 @@ def write_umb(problem: Problem, path: str | os.PathLike[str], *, packing: str = 
         Replaced only once the new file is whole.
     packing : str
         ``"gzip"`` or ``"none"``; unpacked archives are larger, and faster to write and to read.
+    players : int
+        1, an MDP; or 0 for a model with one choice per state, which is then called a DTMC.
 
     Raises
     ------
@@ -56,7 +58,7 @@ def write_umb(problem: Problem, path: str | os.PathLike[str], *, packing: str = 
     """
     if packing not in PACKINGS:
         raise SourceError(f"A UMB file must be packed by one of {', '.join(PACKINGS)}, got '{packing}'.")
-    files = _files(problem)
+    files = _files(problem, players)
     with write_atomically(path) as file:
         if packing == "none":
             _write_tar(file, files)
@@ -75,7 +77,7 @@ def _write_tar(file: BinaryIO, files: dict[str, bytes | memoryview]) -> None:
             archive.addfile(member, io.BytesIO(data))
 
 
-def _files(problem: Problem) -> dict[str, bytes | memoryview]:
+def _files(problem: Problem, players: int) -> dict[str, bytes | memoryview]:
     """Return every file of the archive by name, the index first."""
     mdp = problem.mdp
     files: dict[str, bytes | memoryview] = {
@@ -101,7 +103,7 @@ def _files(problem: Problem) -> dict[str, bytes | memoryview]:
         "file-data": {"tool": "ratherthan"},
         "transition-system": {
             "time": "discrete",
-            "#players": 1,
+            "#players": players,
             "#states": mdp.states,
             "#initial-states": len(mdp.initial),
             "#choices": mdp.choices,

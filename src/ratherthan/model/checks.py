@@ -71,7 +71,26 @@ def shape_faults(mdp: MDP) -> list[Fault]:
         )
     if np.ndim(mdp.initial) != 1 or not _whole(np.asarray(mdp.initial)):
         faults.append(Fault(sentence=f"initial must be a list of states (integers), got {mdp.initial!r}."))
+    return faults + _kind_faults(mdp)
+
+
+def _kind_faults(mdp: MDP) -> list[Fault]:
+    """Return the rewards that are no numbers."""
+    faults = []
+    for name, reward in mdp.rewards.items():
+        for part, values in reward.parts():
+            if not _numbers(values):
+                sentence = f"Reward '{name}' on {part}s must hold numbers, one per {part}, got {values!r:.60}."
+                faults.append(Fault(sentence=sentence, place={"reward": name, "part": part}))
     return faults
+
+
+def _numbers(values: Any) -> bool:
+    """Whether values are numbers, or lists of them that are all of one length."""
+    try:
+        return np.asarray(values).dtype.kind in "fiub"
+    except ValueError:
+        return False
 
 
 def _whole(array: npt.NDArray[Any]) -> bool:

@@ -12,9 +12,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from ratherthan.model._kernels import compiled, is_compiled, sorted_by
 from ratherthan.model.mdp import MDP, Ints
 
 __all__ = ["Index", "branches_of", "build_index", "index_of"]
+
+MANY = 1_000_000
+"""From how many branches on sorting by counting is worth compiling it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,9 +92,7 @@ def build_index(state_to_choices: Ints, choice_to_branches: Ints, branch_to_targ
     width = _width(states, len(choice_to_branches) - 1, len(branch_to_target))
     choice_to_state = np.repeat(np.arange(states, dtype=width), np.diff(state_to_choices))
     branch_to_choice = np.repeat(np.arange(len(choice_to_branches) - 1, dtype=width), np.diff(choice_to_branches))
-    entering_from = np.zeros(states + 1, dtype=np.int64)
-    np.cumsum(np.bincount(branch_to_target, minlength=states), out=entering_from[1:])
-    entering = branch_to_choice[np.argsort(branch_to_target, kind="stable")]
+    entering_from, entering = _sorted_by(branch_to_target, branch_to_choice, states)
     return Index(
         state_to_choices=_locked(state_to_choices, width),
         choice_to_branches=_locked(choice_to_branches, width),
@@ -100,6 +102,15 @@ def build_index(state_to_choices: Ints, choice_to_branches: Ints, branch_to_targ
         entering_from=_locked(entering_from, width),
         entering=_locked(entering, width),
     )
+
+
+def _sorted_by(target: Ints, value: npt.NDArray[Any], count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[Any]]:
+    """Return `value` sorted by `target`, and where each target's begin, ``[count+1]``."""
+    if len(target) > MANY and is_compiled(len(target)):
+        return compiled(sorted_by, len(target))(target, value, count)
+    begin = np.zeros(count + 1, dtype=np.int64)
+    np.cumsum(np.bincount(target, minlength=count), out=begin[1:])
+    return begin, value[np.argsort(target, kind="stable")]
 
 
 def _width(*counts: int) -> type[np.int32 | np.int64]:

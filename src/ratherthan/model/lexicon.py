@@ -5,7 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-__all__ = ["Lexicon"]
+__all__ = ["OBJECTIVE_WORDS", "Lexicon"]
+
+OBJECTIVE_WORDS = (
+    *("best", "best_flexible", "among", "better", "worse", "equal", "noun"),
+    *(
+        "best_one",
+        "among_one",
+        "better_one",
+        "worse_one",
+        "endless",
+        "unit",
+        "amount",
+        "arrive",
+        "arrive_at_all",
+        "there",
+    ),
+)
+"""The words that an objective has; the templates say what each is for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,8 +42,9 @@ class Lexicon:
     states : mapping of str to str
         A noun phrase for single states, by name or number: ``{"12": "the crossing"}``.
     objectives : mapping of str to mapping
-        Words for an objective by its reward's name (``"distance"``), ``"probability"`` or ``"safety"``:
-        ``best`` ("the shortest route") and so on; see the templates for the keys.
+        Words for an objective by its reward's name (``"distance"``, ``"steps"``), else by its kind (``"probability"``,
+        ``"safety"``, ``"risk"``, ``"deadline"``, ``"mission"``, ``"event"``, ``"discounted"``): ``best`` ("the shortest route")
+        and so on, those of `OBJECTIVE_WORDS`.
     """
 
     language: str = "en"

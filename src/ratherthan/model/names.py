@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import overload
 
 import numpy as np
 import numpy.typing as npt
 
 from ratherthan.errors import ModelError, QuestionError
 
-__all__ = ["StateNames", "spell"]
+__all__ = ["Columns", "Pairs", "StateNames", "spell"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,12 +69,7 @@ class StateNames:
         QuestionError
             If no state, or more than one, is called so.
         """
-        if self.strings is not None:
-            found = np.array([i for i, string in enumerate(self.strings) if string == name], dtype=np.int64)
-        elif self.variables:
-            found = np.flatnonzero(self._matching(name))
-        else:
-            found = np.empty(0, dtype=np.int64)
+        found = self.called(name)
         if len(found) == 1:
             return int(found[0])
         if len(found) == 0:
@@ -88,6 +84,14 @@ class StateNames:
             f"{', …' if len(found) > 5 else ''}). Give the state's number.",
             state=name,
         )
+
+    def called(self, name: str) -> npt.NDArray[np.int64]:
+        """Return the states that are called `name`, as `find` understands it."""
+        if isinstance(self.strings, Pairs):
+            return self.strings.called(name)
+        if self.strings is not None:
+            return np.array([i for i, string in enumerate(self.strings) if string == name], dtype=np.int64)
+        return np.flatnonzero(self._matching(name)) if self.variables else np.empty(0, dtype=np.int64)
 
     def _matching(self, name: str) -> npt.NDArray[np.bool_]:
         match = np.ones(self.count, dtype=bool)
@@ -104,6 +108,80 @@ class StateNames:
         if not self.named:
             return f"0 … {self.count - 1} (this model has no state names)"
         return ", ".join(f"'{self[i]}'" for i in range(min(3, self.count)))
+
+
+class Pairs(Sequence[str]):
+    """The names of a product's states, made as they are asked for: how a state is called, and what is remembered there.
+
+    Parameters
+    ----------
+    phrase : callable
+        How a state of the model is called, by its number.
+    names : StateNames
+        The names of the model, under which a state is found as well.
+    state, memory : array of int, ``[S]``
+        The state of the model and the memory of each pair; the first pairs are the states of the model in their order.
+    endings : sequence of str
+        What stands behind the state's name for each memory.
+    """
+
+    def __init__(
+        self,
+        phrase: Callable[[int], str],
+        names: StateNames,
+        state: npt.NDArray[np.integer],
+        memory: npt.NDArray[np.integer],
+        endings: Sequence[str],
+    ) -> None:
+        self.phrase, self.names, self.state, self.memory, self.endings = phrase, names, state, memory, endings
+
+    def __len__(self) -> int:
+        return len(self.state)
+
+    @overload
+    def __getitem__(self, pair: int) -> str: ...
+    @overload
+    def __getitem__(self, pair: slice) -> list[str]: ...
+    def __getitem__(self, pair: int | slice) -> str | list[str]:
+        """Return the name of one pair, or of several."""
+        if isinstance(pair, slice):
+            return [self[i] for i in range(*pair.indices(len(self)))]
+        return f"{self.phrase(int(self.state[pair]))}{self.endings[self.memory[pair]]}"
+
+    def called(self, name: str) -> npt.NDArray[np.int64]:
+        """Return the pairs called `name`; where there are none, the state called so with nothing done yet."""
+        found = np.zeros(len(self), dtype=bool)
+        for memory, ending in enumerate(self.endings):
+            if name.endswith(ending):
+                here = self.memory == memory
+                here[here] = np.isin(self.state[here], self._states(name.removesuffix(ending)))
+                found |= here
+        return np.flatnonzero(found) if found.any() else self._states(name)
+
+    def _states(self, name: str) -> npt.NDArray[np.int64]:
+        """Return the states of the model that are called `name`, there or in sentences."""
+        found = self.names.called(name)
+        if len(found):
+            return found
+        return np.array([s for s in range(self.names.count) if self.phrase(s) == name], dtype=np.int64)
+
+
+class Columns(Mapping[str, npt.NDArray[np.generic]]):
+    """State variables of a product: those of the model, taken when they are asked for."""
+
+    def __init__(self, variables: Mapping[str, npt.NDArray[np.generic]], state: npt.NDArray[np.integer]) -> None:
+        self._variables, self._state = variables, state
+
+    def __getitem__(self, name: str) -> npt.NDArray[np.generic]:
+        """Return one column, ``[S]``."""
+        column: npt.NDArray[np.generic] = np.asarray(self._variables[name])[self._state]
+        return column
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._variables)
+
+    def __len__(self) -> int:
+        return len(self._variables)
 
 
 def spell(value: object) -> str:

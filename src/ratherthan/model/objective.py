@@ -1,4 +1,4 @@
-"""What is wanted of a plan, as data: a reward to keep small until a goal, or a chance to reach one.
+"""What is wanted of a plan, as data: a reward to keep small or to gather, a chance to reach a goal, or several in order.
 
 Sets of states are kept as PRISM state formulas over labels (``"goal"``) and state variables (``x = 3 & !busy``), so that
 an objective means the same on every representation of a model and survives a round trip through JSON.
@@ -8,7 +8,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["ExpectedCost", "Objective", "ReachAvoid", "Threshold"]
+__all__ = [
+    "Discounted",
+    "ExpectedCost",
+    "ExpectedReward",
+    "Level",
+    "Lexicographic",
+    "Mission",
+    "Objective",
+    "ReachAvoid",
+    "Threshold",
+    "levels_of",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,8 +45,7 @@ class ExpectedCost:
     @property
     def text(self) -> str:
         """The objective in PRISM's property syntax."""
-        what = "T" if self.reward is None else f'R{{"{self.reward}"}}'
-        return f"{what}{'max' if self.maximise else 'min'}=? [F {self.goal}]"
+        return f"{_head(self.reward, maximise=self.maximise)} [F {self.goal}]"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +75,110 @@ class ReachAvoid:
         return f"P{'max' if self.maximise else 'min'}=? [{path}]"
 
 
-Objective = ExpectedCost | ReachAvoid
+@dataclass(frozen=True, kw_only=True)
+class ExpectedReward:
+    """Maximise (minimise) the expected total of a reward until a goal that must be reached: ``R{"r"}max=? [Fsure g]``.
+
+    Over policies that reach the goal in a finite expected number of steps; where none does the value is -∞ (∞ where it is
+    minimised). Rewards may have both signs. Where more and more can be gathered before the goal the value is ∞ (-∞). With rewards that are
+    nowhere negative, minimised, it is the same as `ExpectedCost`.
+
+    Parameters
+    ----------
+    goal : str
+        A state formula.
+    reward : str, optional
+        The name of the reward; None counts steps.
+    maximise : bool
+    """
+
+    goal: str
+    reward: str | None
+    maximise: bool = True
+
+    @property
+    def text(self) -> str:
+        """The objective as a property; ``Fsure`` demands arrival."""
+        return f"{_head(self.reward, maximise=self.maximise)} [Fsure {self.goal}]"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Discounted:
+    """Maximise (minimise) the expected discounted sum of a reward: ``R{"r"}max=? [Cdiscount=0.95]``.
+
+    Parameters
+    ----------
+    reward : str, optional
+        The name of the reward, of any sign; None counts steps.
+    discount : float
+        γ, above 0 and below 1: what is paid after k steps counts γᵏ.
+    maximise : bool
+    """
+
+    reward: str | None
+    discount: float
+    maximise: bool = True
+
+    @property
+    def text(self) -> str:
+        """The objective in Storm's property syntax."""
+        return f"{_head(self.reward, maximise=self.maximise)} [Cdiscount={self.discount!r}]"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mission:
+    """Maximise (minimise) the probability of what takes memory to tell: ``Pmax=? [F<=10 g]``, ``Pmax=? [F (a & (F b))]``.
+
+    It is solved and explained on the product of the model with what must be remembered.
+
+    Parameters
+    ----------
+    formula : str
+        A co-safe formula of linear temporal logic with step bounds, over state formulas.
+    maximise : bool
+    """
+
+    formula: str
+    maximise: bool = True
+
+    @property
+    def text(self) -> str:
+        """The objective in PRISM's property syntax."""
+        return f"P{'max' if self.maximise else 'min'}=? [{self.formula}]"
+
+
+Level = ExpectedCost | ExpectedReward | ReachAvoid | Discounted | Mission
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lexicographic:
+    """The first level first; of the choices that are best for it those that are best for the second, and so on.
+
+    Parameters
+    ----------
+    levels : tuple of objectives
+        At least two.
+    """
+
+    levels: tuple[Level, ...]
+
+    @property
+    def text(self) -> str:
+        """The levels as properties with "then" between them."""
+        return " then ".join(level.text for level in self.levels)
+
+
+Objective = Level | Lexicographic
+
+
+def levels_of(objective: Objective) -> tuple[Level, ...]:
+    """Return the levels of a lexicographic objective; any other is its own only one."""
+    return objective.levels if isinstance(objective, Lexicographic) else (objective,)
+
+
+def _head(reward: str | None, *, maximise: bool) -> str:
+    what = "T" if reward is None else f'R{{"{reward}"}}'
+    return f"{what}{'max' if maximise else 'min'}=?"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +188,7 @@ class Threshold:
     ``P>=p`` must hold under every policy, so it compares the minimum (PRISM's meaning); ``Pmax>=p`` says it outright.
     """
 
-    objective: Objective
+    objective: Level
     relation: str  # one of >=, >, <=, <
     bound: float
 

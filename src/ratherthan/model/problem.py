@@ -6,11 +6,41 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ratherthan.model.lexicon import Lexicon
-from ratherthan.model.mdp import MDP
-from ratherthan.model.objective import Objective, Threshold
+from ratherthan.model.mdp import MDP, Bools, Ints
+from ratherthan.model.objective import Mission, Objective, Threshold
 from ratherthan.model.world import World
 
-__all__ = ["Problem"]
+__all__ = ["Problem", "Unfolding"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Unfolding:
+    """How the model of a problem came from another: each state is one of the other model's with what must be remembered.
+
+    Parameters
+    ----------
+    mission : Mission
+        What it was unfolded for.
+    origin : Problem
+        The problem on the model as it is.
+    state : array of int, ``[S]``
+        The state of `origin` that each state is. The first states are those of `origin`, in their order: the mission
+        begins anew there.
+    memory : array of int, ``[S]``
+        What is remembered, an index into `left`.
+    left : tuple of str
+        What is left to do for each memory, a formula.
+    satisfied, violated : array of bool, ``[S]``
+        Where the mission is done, and where it has failed for good.
+    """
+
+    mission: Mission
+    origin: Problem
+    state: Ints  # [S]
+    memory: Ints  # [S]
+    left: tuple[str, ...]
+    satisfied: Bools  # [S]
+    violated: Bools  # [S]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,7 +55,9 @@ class Problem:
     objective : Objective, optional
         What the source itself wants, or what was asked for.
     properties : mapping of str to Objective or Threshold
-        The properties that came with the source, by name (texts that could not be parsed are left out, with a note).
+        The properties that came with the source, by name, if they can be explained.
+    others : mapping of str to str
+        The other ones, by name, as texts in PRISM's syntax: a model checker may answer them.
     definitions : mapping of str to str
         Constants and formulas of the source by name, as PRISM expressions, which properties may mention.
     lexicon : Lexicon
@@ -33,13 +65,17 @@ class Problem:
         Where it came from, as it was named.
     notes : tuple of str
         What a reader should know: repairs made while reading, for instance.
+    unfolding : Unfolding, optional
+        Where the model is the product of another with what must be remembered.
     """
 
     mdp: MDP
     world: World | None = None
     objective: Objective | None = None
     properties: Mapping[str, Objective | Threshold] = field(default_factory=dict)
+    others: Mapping[str, str] = field(default_factory=dict)
     definitions: Mapping[str, str] = field(default_factory=dict)
     lexicon: Lexicon = field(default_factory=Lexicon)
     source: str = ""
     notes: tuple[str, ...] = ()
+    unfolding: Unfolding | None = None

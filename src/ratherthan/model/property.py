@@ -1,7 +1,9 @@
 """The text of a PRISM property and a problem enter, an objective or a threshold leaves.
 
 Read are the properties that can be explained: ``R{"r"}min=? [F g]`` (``max``; ``T`` counts steps) and ``Pmax=? [a U b]``,
-``Pmax=? [F g]`` (``min``), each also with a bound instead of ``=?``. A bound must hold under every policy, so ``P>=p`` and
+``Pmax=? [F g]`` (``min``), each also with a bound instead of ``=?``; ``R{"r"}max=? [Fsure g]``, over plans that are sure to
+arrive; ``R{"r"}max=? [Cdiscount=0.95]``, a discounted sum; and several, the first before the second, as ``… then …``. A
+reward may be a weighted sum: ``R{"distance + 10 * risk"}``. A bound must hold under every policy, so ``P>=p`` and
 ``P>p`` compare the minimum, ``P<=p`` and ``P<p`` the maximum; ``Pmax>=p`` says it outright. Everything else of PRISM's
 property language is refused by its name, with the nearest property that can be explained.
 
@@ -11,31 +13,48 @@ the labels and state variables of its model. Labels, rewards, names and types ar
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 
 from ratherthan.errors import PropertyError
 from ratherthan.model.formula import constant, resolved, states_of
-from ratherthan.model.objective import ExpectedCost, Objective, ReachAvoid, Threshold
+from ratherthan.model.objective import (
+    Discounted,
+    ExpectedCost,
+    ExpectedReward,
+    Level,
+    Lexicographic,
+    Mission,
+    Objective,
+    ReachAvoid,
+    Threshold,
+)
+from ratherthan.model.path import is_temporal, plain_until, positive, state_formulas
 from ratherthan.model.problem import Problem
 from ratherthan.model.syntax import Term, text_of
-from ratherthan.model.temporal import Statement, check_path
+from ratherthan.model.temporal import Statement, chance_of, refusal, until_of
 from ratherthan.model.valuation import one_of
+from ratherthan.model.weights import canonical_reward
 
-__all__ = ["choose_objective", "parse_property"]
+__all__ = ["choose_objective", "lexicographic", "parse_property"]
 
 _GOALS = ("goal", "target", "destination")
 _MOST_LISTED = 12
+_THEN = re.compile(r"(?<=\])\s*then\s+")
 
 
-def parse_property(text: str, problem: Problem) -> Objective | Threshold:
+def parse_property(text: str, problem: Problem, *, discount: float | None = None) -> Objective | Threshold:
     """Read one property in PRISM's syntax.
 
     Parameters
     ----------
     text : str
-        The property; a name (``"name":``), comments and semicolons at the end may stand around it.
+        The property; a name (``"name":``), comments and semicolons at the end may stand around it. Several with "then"
+        between them are lexicographic.
     problem : Problem
         Its model, and the constants and formulas that the property may mention.
+    discount : float, optional
+        For ``R{"r"}max=? [C]``.
 
     Returns
     -------
@@ -50,14 +69,55 @@ def parse_property(text: str, problem: Problem) -> Objective | Threshold:
     """
     from ratherthan.model.reading import read
 
+    parts = _parts(text)
+    if len(parts) > 1:
+        return lexicographic([parse_property(part, problem, discount=discount) for part in parts])
     statement: Statement = read("property", text, "property")
     try:
-        return _meaning(statement, problem, text)
+        return _meaning(statement, problem, text, discount)
     except RecursionError:
         raise PropertyError(f"The property '{text[:60]} …' is nested too deeply to be evaluated.", text=text) from None
 
 
-def _meaning(said: Statement, problem: Problem, text: str) -> Objective | Threshold:
+def _parts(text: str) -> list[str]:
+    """Return the properties with "then" between them; a "then" within brackets or quotation marks is none."""
+    parts, begin = [], 0
+    for then in _THEN.finditer(text):
+        outside = re.sub(r'"[^"\n]*"', "", text[begin : then.start()])
+        if '"' not in outside and outside.count("[") == outside.count("]"):
+            parts.append(text[begin : then.start()])
+            begin = then.end()
+    return [*parts, text[begin:]]
+
+
+def lexicographic(levels: Sequence[Objective | Threshold]) -> Lexicographic:
+    """Return several objectives, the first before the second, as one.
+
+    Raises
+    ------
+    PropertyError
+        If one is a yes-or-no question or has levels itself, or one stands twice.
+    """
+    checked: list[Level] = []
+    for level in levels:
+        if isinstance(level, Threshold | Lexicographic):
+            raise PropertyError(
+                f"Each of several properties must ask for one best value (=?), got '{level.text}'.", text=level.text
+            )
+        if level in checked:
+            raise PropertyError(f"Several properties must differ, got '{level.text}' twice.", text=level.text)
+        checked.append(level)
+    for level in checked[1:]:
+        if isinstance(level, Mission):
+            raise PropertyError(
+                "Of several properties only the first may need memory (steps, or one thing after another), for the run ends "
+                f"with it; got '{level.text}' after '{checked[0].text}'. Put it first.",
+                text=level.text,
+            )
+    return Lexicographic(levels=tuple(checked))
+
+
+def _meaning(said: Statement, problem: Problem, text: str, discount: float | None) -> Objective | Threshold:
     """Return what a statement means for a problem."""
     reward = _reward(said.reward, problem, text) if said.operator == "R" else None
     if said.relation is None or said.bound is None:
@@ -67,10 +127,13 @@ def _meaning(said: Statement, problem: Problem, text: str) -> Objective | Thresh
                 f"got '{text.strip()}'.",
                 text=text,
             )
-        return _objective(said, reward, said.way == "max" or (not said.way and said.operator == "P"), problem)
+        maximise = said.way == "max" or (not said.way and said.operator == "P")
+        return _objective(said, reward, problem, maximise=maximise, discount=discount)
     maximise = said.way == "max" if said.way else said.relation in ("<=", "<")
-    objective = _objective(said, reward, maximise, problem)
+    objective = _objective(said, reward, problem, maximise=maximise, discount=discount)
     bound = constant(resolved(said.bound, problem.definitions))
+    if isinstance(objective, Discounted | ExpectedReward) and -float("inf") < bound < float("inf"):
+        return Threshold(objective=objective, relation=said.relation, bound=bound)
     if not 0 <= bound < float("inf") or (said.operator == "P" and bound > 1):
         wanted = "lie between 0 and 1" if said.operator == "P" else "be finite and at least 0"
         raise PropertyError(f"The bound of a property must {wanted}, got {bound:g} in '{text.strip()}'.", text=text)
@@ -82,8 +145,10 @@ def _reward(name: str | None, problem: Problem, text: str) -> str:
     rewards = problem.mdp.rewards
     if name is None and len(rewards) == 1:
         return next(iter(rewards))
-    if name is not None and name in rewards:
-        return name
+    if name is not None and rewards:
+        found = canonical_reward(name, rewards)
+        if found is not None:
+            return found
     listed = one_of(name or "", rewards)
     if not rewards:
         raise PropertyError(
@@ -100,21 +165,58 @@ def _reward(name: str | None, problem: Problem, text: str) -> str:
     raise PropertyError(f"A reward must be one of the model's: {listed}; got '{name}'.", reward=name, text=text)
 
 
-def _objective(said: Statement, reward: str | None, maximise: bool, problem: Problem) -> Objective:
+def _objective(
+    said: Statement, reward: str | None, problem: Problem, *, maximise: bool, discount: float | None
+) -> Level:
     """Return the objective of a statement, refusing paths that cannot be explained."""
     path = said.path
-    check_path(path, f'R{{"{reward}"}}' if said.operator == "R" else said.operator, maximise=maximise)
-    parts = [resolved(part, problem.definitions, problem.mdp.names.variables) for part in path.args]
-    for part in parts:
+    if path.op == "C":
+        return Discounted(reward=reward, discount=_discount(path, problem, discount), maximise=maximise)
+    if discount is not None:
+        raise PropertyError(
+            f"A discount must come with a sum without end, such as R{{\"reward\"}}max=? [C], got '{path.op}' and the discount "
+            f"{discount:g}."
+        )
+    if said.operator == "P":
+        return _chance(path, problem, maximise=maximise)
+    kind = ExpectedReward if path.value == "sure" else ExpectedCost
+    until = until_of(path, f'R{{"{reward}"}}' if said.operator == "R" else said.operator, maximise=maximise)
+    goal = resolved(until, problem.definitions, problem.mdp.names.variables)
+    states_of(problem.mdp, goal)
+    return kind(goal=text_of(goal), reward=reward, maximise=maximise)
+
+
+def _chance(path: Term, problem: Problem, *, maximise: bool) -> ReachAvoid | Mission:
+    """Return the objective of a chance: one that needs no memory where that will do."""
+    if not is_temporal(path):
+        states_of(problem.mdp, resolved(path, problem.definitions, problem.mdp.names.variables))
+    said = chance_of(path, problem, maximise=maximise)
+    for part in state_formulas(said):
         states_of(problem.mdp, part)
-    goal = text_of(parts[-1])
-    if said.operator in "RT":
-        return ExpectedCost(goal=goal, reward=reward, maximise=maximise)
-    anywhere = path.op == "F" or parts[0] == Term("truth", value=True)
-    return ReachAvoid(goal=goal, through=None if anywhere else text_of(parts[0]), maximise=maximise)
+    plain = plain_until(positive(said))
+    if plain is None:
+        return Mission(formula=text_of(said), maximise=maximise)
+    through, goal = plain
+    return ReachAvoid(goal=text_of(goal), through=None if through is None else text_of(through), maximise=maximise)
 
 
-def choose_objective(problem: Problem, text: str | None = None) -> Objective | Threshold:
+def _discount(path: Term, problem: Problem, given: float | None) -> float:
+    """Return the discount that a path or the caller gives."""
+    if path.args:
+        said = constant(resolved(path.args[0], problem.definitions))
+        if given is not None and given != said:
+            raise PropertyError(f"A discount must be given once, got {said:g} in the property and {given:g} beside it.")
+        given = said
+    if given is None:
+        raise refusal("total")
+    if not 0 < given < 1:
+        raise PropertyError(f"A discount must lie between 0 and 1, both excluded, got {given:g}.", discount=given)
+    return float(given)
+
+
+def choose_objective(
+    problem: Problem, text: str | None = None, *, discount: float | None = None
+) -> Objective | Threshold:
     """Return what is wanted of a problem.
 
     Parameters
@@ -124,6 +226,8 @@ def choose_objective(problem: Problem, text: str | None = None) -> Objective | T
         A property in PRISM's syntax, or the name of one of the source's own. Without it: the source's own if it has exactly
         one; else, with exactly one reward and one label among goal, target and destination, the least expected reward until
         there.
+    discount : float, optional
+        For ``R{"r"}max=? [C]``.
 
     Returns
     -------
@@ -136,7 +240,11 @@ def choose_objective(problem: Problem, text: str | None = None) -> Objective | T
     """
     if text is not None:
         name = text.strip().removeprefix('"').removesuffix('"')
-        return problem.properties[name] if name in problem.properties else _parsed_or_named(text, problem)
+        if name in problem.properties:
+            return problem.properties[name]
+        return _parsed_or_named(problem.others.get(name, text), problem, discount)
+    if discount is not None:
+        raise PropertyError("A discount must come with a property, such as --property 'R{\"reward\"}max=? [C]'.")
     if problem.objective is not None:
         return problem.objective
     if len(problem.properties) == 1:
@@ -147,15 +255,15 @@ def choose_objective(problem: Problem, text: str | None = None) -> Objective | T
     raise PropertyError(_what_there_is(problem))
 
 
-def _parsed_or_named(text: str, problem: Problem) -> Objective | Threshold:
+def _parsed_or_named(text: str, problem: Problem, discount: float | None) -> Objective | Threshold:
     """Parse `text`; where it looks like a name rather than a property, list the names there are."""
-    if problem.properties and not set(text) & set("[]=<>"):
-        names = one_of(text.strip(), problem.properties)
+    if (problem.properties or problem.others) and not set(text) & set("[]=<>"):
+        names = one_of(text.strip(), [*problem.properties, *problem.others])
         raise PropertyError(
             f"A property must be in PRISM's syntax or one of the source's own: {names}; got '{text.strip()}'.",
             text=text,
         )
-    return parse_property(text, problem)
+    return parse_property(text, problem, discount=discount)
 
 
 def _what_there_is(problem: Problem) -> str:

@@ -109,7 +109,7 @@ class _Properties(_Formulas):
 
     def __init__(self) -> None:
         super().__init__()
-        for what in REFUSED:
+        for what in REFUSED.keys() - {"total"}:
             setattr(self, what, partial(_refuse, what))
 
     def start(self, parts: list[Any]) -> Statement:
@@ -146,6 +146,14 @@ class _Properties(_Formulas):
         """Return a relation and a bound."""
         return str(parts[0]), parts[1]
 
+    def total(self, _: list[Token]) -> Term:
+        """Return ``C``: a reward that adds up without end."""
+        return Term("C")
+
+    def discounted(self, parts: list[Any]) -> Term:
+        """Return ``Cdiscount=0.9``: the same, discounted."""
+        return Term("C", (parts[1],))
+
     def prefix(self, parts: list[Any]) -> Term:
         """Return ``F``, ``G`` or ``X`` with its operand."""
         return _temporal(parts[0], parts[1:])
@@ -156,9 +164,14 @@ class _Properties(_Formulas):
 
 
 def _temporal(operator: Token, parts: list[Any]) -> Term:
-    """Return a temporal operator with its operands; its value is ``"bounded"`` where it has a bound (``F<=3``, ``Fsteps``)."""
+    """Return a temporal operator with its operands.
+
+    Its value is the text of its bound (``F<=3``: ``"<=3"``, ``Fsteps<=3``: ``"steps<=3"``), ``"sure"`` for ``Fsure``, and
+    None where there is nothing of that.
+    """
     operands = tuple(part for part in parts if isinstance(part, Term))
-    return Term(operator[0], operands, "bounded" if len(operands) < len(parts) or len(operator) > 1 else None)
+    bound = "".join(part for part in parts if not isinstance(part, Term))
+    return Term(operator[0], operands, f"{operator[1:]}{bound}" or None)
 
 
 def _refuse(what: str, _: object) -> Term:
@@ -226,6 +239,13 @@ def read(kind: str, text: str, what: str) -> Any:
 
 def _unexpected(text: str, what: str, at: int, possible: set[str]) -> PropertyError:
     """Return the error for what stands at place `at`, where one of the `possible` words must come."""
+    if "BETWEEN" not in possible and re.match(r"[UWR](steps|time)?\b", text[at:]) and possible & {"RSQB", "RPAR"}:
+        return PropertyError(
+            f"U, W and R must stand between two parts: put brackets around one of them, as in a U (b U c), "
+            f"at column {at + 1} of '{_shown(text, at)}'.",
+            text=text,
+            column=at + 1,
+        )
     foreign = next((sign for sign in _FOREIGN_SIGN.finditer(text) if sign.start() <= at < sign.end()), None)
     if foreign is None:
         wanted, hint = _wanted(possible, text[at:]), ""

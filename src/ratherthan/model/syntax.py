@@ -5,7 +5,8 @@ binary operators group to the left, as PRISM's grammar has it (so ``!x = 1`` is 
 the grammar in ``formula.lark``, which has one rule for each of these levels; the table here is for printing.
 
 The canonical text has one blank around binary operators and brackets only where the levels need them, so that reading it
-again gives the same tree. ``&`` and ``|`` are associative and kept flat, whatever the brackets; so are ``+`` and ``*`` where
+again gives the same tree. A temporal operator inside another or inside a formula stands in brackets, as do its operands
+unless they are single words: ``F<=9 ("a" & (F "b"))``. ``&`` and ``|`` are associative and kept flat, whatever the brackets; so are ``+`` and ``*`` where
 they group to the left.
 """
 
@@ -15,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 
-__all__ = ["FUNCTIONS", "Term", "joined", "negated", "parse_formula", "text_of"]
+__all__ = ["FUNCTIONS", "TEMPORAL", "Term", "joined", "negated", "parse_formula", "text_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class Term:
     """One node of a formula: an operator with its operands, or a leaf with its value.
 
     `op` is ``number``, ``truth``, ``label``, ``name``, ``call`` (value: the function), ``neg`` (unary minus), ``!``, ``?:``
-    or a binary operator as it is written; properties add temporal operators.
+    or a binary operator as it is written; or a temporal operator of a path (value: its bound as text).
     """
 
     op: str
@@ -37,8 +38,11 @@ FUNCTIONS = {
 }  # fmt: skip
 """The functions, with the least and the largest number of arguments."""
 
+TEMPORAL = ("F", "G", "X", "U", "W", "R")
+"""The operators of paths, see path.py."""
+
 _LEVELS = {
-    "?:": 1, "=>": 2, "<=>": 3, "|": 4, "&": 5, "!": 6, "=": 7, "!=": 7,
+    "F": 0, "G": 0, "X": 0, "U": 0, "W": 0, "R": 0, "?:": 1, "=>": 2, "<=>": 3, "|": 4, "&": 5, "!": 6, "=": 7, "!=": 7,
     "<": 8, "<=": 8, ">": 8, ">=": 8, "+": 9, "-": 9, "*": 10, "/": 10, "neg": 11,
 }  # fmt: skip
 _LEAF = 12
@@ -114,6 +118,9 @@ def text_of(term: Term) -> str:
         test, yes, no = term.args
         return f"{_text_at(test, _TERNARY + 1)} ? {_text_at(yes, _TERNARY + 1)} : {_text_at(no, _TERNARY)}"
     level = _LEVELS[term.op]
+    if level == 0:
+        *left, last = (_operand_text(arg) for arg in term.args)
+        return " ".join([*left, f"{term.op}{term.value or ''}", last])
     if term.op in "&|":
         return f" {term.op} ".join(_text_at(arg, level + (arg.op != term.op)) for arg in term.args)
     return f" {term.op} ".join(_text_at(arg, level + (place > 0)) for place, arg in enumerate(term.args))
@@ -133,6 +140,12 @@ def _leaf_text(term: Term) -> str | None:
         case "call":
             return f"{term.value}({', '.join(map(text_of, term.args))})"
     return None
+
+
+def _operand_text(term: Term) -> str:
+    """Return the text of a temporal operator's operand."""
+    plain = term.args[0] if term.op == "!" else term
+    return text_of(term) if plain.op in ("truth", "label", "name") else f"({text_of(term)})"
 
 
 def _text_at(term: Term, level: int) -> str:

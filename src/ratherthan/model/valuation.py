@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from ratherthan.errors import PropertyError
 from ratherthan.model.mdp import MDP, Bools
-from ratherthan.model.syntax import Term, text_of
+from ratherthan.model.syntax import TEMPORAL, Term, text_of
 
 __all__ = ["Evaluator", "Values", "deadlocks", "one_of"]
 
@@ -127,6 +127,8 @@ class Evaluator:
         variables = self.mdp.names.variables
         if name not in variables:
             hint = f' Labels stand in quotation marks: "{name}".' if name in self.mdp.labels else ""
+            if name in TEMPORAL:
+                hint = f" The operator {name} needs an operand behind it."
             raise PropertyError(
                 f"A name must be a state variable, constant or formula of the model; variables are "
                 f"{one_of(name, variables)}; got '{name}'.{hint}",

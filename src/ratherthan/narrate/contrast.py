@@ -4,61 +4,65 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ratherthan.explain.explanation import Claim, Measured, Step, Tally
+from ratherthan.explain.explanation import Claim, Measured, Step
 from ratherthan.factors import Comparison, compare
-from ratherthan.narrate.numbers import contrasted, plain
-from ratherthan.narrate.words import Vocabulary
+from ratherthan.narrate.evidence import claims_at, flexibility_of, measured, pair, values
+from ratherthan.narrate.words import Vocabulary, Wanted
 
 __all__ = ["contrast_reason"]
-
-_FLEXIBILITY = {"more flexible": "more", "less flexible": "fewer", "as flexible": "same"}
 
 
 def contrast_reason(words: Vocabulary, step: Step) -> str:
     """Return what is said after "We move east rather than south at grid 10"."""
-    claims = {claim.claim: claim for claim in step.claims}
-    flexibility = next((claims[name] for name in _FLEXIBILITY if name in claims), None)
-    outcome = next((claims[name] for name in ("better", "worse", "equal") if name in claims), None)
-    key = "open" if outcome is None else outcome.claim
-    if outcome is not None and outcome.claim == "better" and _rows(outcome)[1].fate is not None:
+    flexibility, counted = flexibility_of(claims_at(step, 0))
+    outcomes = [_outcome(claims_at(step, level)) for level in range(len(words.explanation.levels))]
+    told = [claim for claim in outcomes if claim is not None]
+    key = "open" if not told else told[-1].claim
+    if told and key == "better" and _rows(told[-1])[1].fate is not None:
         key = "avoids"
-    filled = {"clause": "" if outcome is None else _clause(words, step, outcome)} | _counts(flexibility)
-    template: str = words.table("contrasts")[key]["unsaid" if flexibility is None else _FLEXIBILITY[flexibility.claim]]
+    filled = {"clause": _clauses(words, step, told) if told else ""} | counted
+    template: str = words.table("contrasts")[key][flexibility]
     return template.format(**filled)
 
 
-def _counts(claim: Claim | None) -> dict[str, str]:
-    if claim is None:
-        return {}
-    own, foil = claim.evidence.taken, claim.evidence.others[0]
-    assert isinstance(own, Tally)
-    assert isinstance(foil, Tally)
-    return {"count": _tally(own), "foil_count": _tally(foil)}
-
-
-def _tally(tally: Tally) -> str:
-    return str(tally.lower) if tally.lower == tally.upper else f"{tally.lower} to {tally.upper}"
+def _outcome(claims: Mapping[str, Claim]) -> Claim | None:
+    return next((claims[name] for name in ("better", "worse", "equal") if name in claims), None)
 
 
 def _rows(claim: Claim) -> tuple[Measured, Measured]:
-    own, foil = claim.evidence.taken, claim.evidence.others[0]
-    assert isinstance(own, Measured)
-    assert isinstance(foil, Measured)
-    return own, foil
+    return measured(claim.evidence.taken), measured(claim.evidence.others[0])
 
 
-def _clause(words: Vocabulary, step: Step, claim: Claim) -> str:
-    """Return the clause about the outcome."""
+def _clauses(words: Vocabulary, step: Step, told: list[Claim]) -> str:
+    """Return the clause about the outcome: that of the level that decides, after what is equal before it."""
+    if len(told) == 1:
+        return _clause(words, step, told[0], words.table("clauses"))
+    second, step_only = words.table("second_clauses"), words.explanation.question.policy_values
+    equal = told if told[-1].claim == "equal" and _usual(words, told[-1]) else told[:-1]
+    phrases = [words.objectives[claim.level].words["equal"] for claim in equal]
+    before: str = second["equal"].format(equal_before=words.language.joined(phrases, "and"))
+    if equal is told:
+        return before + (words.table("trades")["on"] if step_only else "")
+    return str(second["both"].format(before=before, clause=_clause(words, step, told[-1], second)))
+
+
+def _usual(words: Vocabulary, claim: Claim) -> bool:
+    """Return whether two choices that are equal lead anywhere at all."""
+    return _clause_key(words, claim, *_rows(claim)) in ("equal", "equal_step")
+
+
+def _clause(words: Vocabulary, step: Step, claim: Claim, preferred: Mapping[str, str]) -> str:
+    """Return the clause about one level."""
     own, foil = _rows(claim)
-    clauses: Mapping[str, str] = words.table("clauses")
-    chance = words.explanation.objective.kind != "cost"
-    numbers: Mapping[str, str] = words.table("numbers")
+    wanted = words.objectives[claim.level]
     better, worse = (own, foil) if claim.claim == "better" else (foil, own)
-    pair = contrasted(worse.number.value, [better.number.value], numbers, chance=chance)
-    said = numbers["pair"].format(better=pair[1][0], own=pair[0]) if pair else numbers["close"]
-    values = numbers["values"].format(better=plain(better.number.value, numbers, chance=chance))
-    return clauses[_clause_key(words, claim, own, foil)].format(
-        numbers=said, values=values, foil_doing=words.doing(step.foil or ""), **words.objective
+    key = _clause_key(words, claim, own, foil)
+    clauses: Mapping[str, str] = {**words.table("clauses"), **preferred}
+    return clauses[key].format(
+        numbers=pair(words, wanted, worse.number.value, [better.number.value]),
+        values=values(words, wanted, [better.number.value]),
+        foil_doing=words.doing(step.foil or ""),
+        **wanted.words,
     )
 
 
@@ -67,9 +71,7 @@ def _clause_key(words: Vocabulary, claim: Claim, own: Measured, foil: Measured) 
     if claim.claim == "equal":
         if own.fate is not None:
             return "equal_infinite" + step
-        nothing = own.number.lower == own.number.upper == 0.0
-        lost = nothing and words.explanation.objective.kind in ("probability", "safety")
-        return ("equal_lost" if lost else "equal") + step
+        return ("equal_lost" if _lost(words.objectives[claim.level], own) else "equal") + step
     if claim.claim == "worse":
         return {None: "worse", "dead end": "worse_dead", "may fail": "worse_fail"}[own.fate] + step
     if foil.fate is not None:
@@ -81,3 +83,8 @@ def _clause_key(words: Vocabulary, claim: Claim, own: Measured, foil: Measured) 
         for _, optimum, followed in claim.evidence.follows
     )
     return "better" if kept else "better_begun"
+
+
+def _lost(wanted: Wanted, row: Measured) -> bool:
+    """Return whether a choice has no chance at all to do what is wanted."""
+    return wanted.record.chance and wanted.record.maximise and row.number.lower == row.number.upper == 0.0

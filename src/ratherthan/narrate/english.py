@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-__all__ = ["gerund", "joined", "qualified", "verb_phrase_after"]
+__all__ = ["counted", "gerund", "joined", "qualified", "shortened", "verb_phrase_after"]
 
 _AS_IT_IS = ("be", "see", "flee", "agree", "free", "dye", "eye", "hoe", "shoe", "toe", "canoe", "singe", "tinge")
 _DOUBLED = ("begin", "forget", "reset", "admit", "permit", "commit", "submit", "transfer", "refer", "prefer", "quit")
@@ -70,3 +70,30 @@ def verb_phrase_after(foil: str, fact: str) -> str:
     """
     verb, _, rest = foil.partition(" ")
     return rest if rest and fact.partition(" ")[0] == verb else foil
+
+
+def shortened(phrase: str) -> str:
+    """Return a phrase about a route for a sentence that has named a route before.
+
+    Examples
+    --------
+    >>> [shortened(phrase) for phrase in ("a safer route", "the safest route", "one of the safest routes", "a detour")]
+    ['a safer one', 'the safest', 'one of the safest', 'a detour']
+    """
+    if phrase.endswith(" routes"):
+        return phrase.removesuffix(" routes")
+    if not phrase.endswith(" route"):
+        return phrase
+    kept = phrase.removesuffix(" route")
+    return kept if kept.startswith("the ") else f"{kept} one"
+
+
+def counted(phrase: str) -> str:
+    """Return a number with a noun in the plural as it is said: "1 steps" → "1 step".
+
+    Examples
+    --------
+    >>> [counted(phrase) for phrase in ("1 steps", "11 steps", "a risk of 1")]
+    ['1 step', '11 steps', 'a risk of 1']
+    """
+    return phrase.removesuffix("s") if re.fullmatch(r"1 [^ ]*s", phrase) else phrase

@@ -5,13 +5,15 @@ A sentence is said only for a claim that the explanation carries; there is nothi
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
-from ratherthan.explain.explanation import Claim, Explanation, Measured, Step, Tally
+from ratherthan.explain.explanation import Explanation, Step
 from ratherthan.model.lexicon import Lexicon
 from ratherthan.narrate.contrast import contrast_reason
-from ratherthan.narrate.numbers import at_most, contrasted, percent, plain
+from ratherthan.narrate.numbers import at_most, percent
+from ratherthan.narrate.reasons import details, reason
+from ratherthan.narrate.trades import asides, totals, traded, unbeaten
 from ratherthan.narrate.words import Vocabulary, vocabulary
 from ratherthan.solve.solution import Outcome
 
@@ -47,11 +49,13 @@ def _state_text(words: Vocabulary) -> str:
     step = explanation.steps[0]
     if step.foil is not None:
         template: str = words.table("sentences")["rather_than"]
-        return template.format(
+        why, more = traded(words, step) if step.trades else (contrast_reason(words, step), "")
+        said = template.format(
             foil=words.language.verb_phrase_after(words.act(step.foil), words.act(step.action)),
-            reason=contrast_reason(words, step),
+            reason=_after(words, step, why),
             **_parts(words, step),
         )
+        return said + more
     return " ".join([_sentence(words, "alone", step), *_unproved(words)])
 
 
@@ -63,6 +67,8 @@ def _unproved(words: Vocabulary) -> list[str]:
 
 def _end(words: Vocabulary) -> str:
     explanation = words.explanation
+    if explanation.route_outcome == "there":
+        return words.objective["there"]
     template: str = words.table("route")[explanation.route_outcome]
     return template.format(place=words.place(explanation.start))
 
@@ -82,9 +88,21 @@ def _route_text(words: Vocabulary) -> str:
         sentences += _closing(words, told)
     if explanation.route_outcome == "circles":
         sentences.append(_circle(words))
-    if explanation.route_outcome == "open end" and explanation.route[-2:] == explanation.route[-1:] * 2:
-        sentences.append(words.table("route")["remain"].format(place=words.place(explanation.route[-1])))
-    return " ".join(sentences + _chances(words) + _unproved(words))
+    sentences += _open_end(words)
+    more = _chances(words) + unbeaten(words, told) + totals(words) + _unproved(words)
+    return " ".join(sentences + more)
+
+
+def _open_end(words: Vocabulary) -> list[str]:
+    """Return how a route without a goal goes on: it stays, or a sum without end begins anew."""
+    explanation, table = words.explanation, words.table("route")
+    last = explanation.route[-1]
+    if explanation.route_outcome != "open end":
+        return []
+    if explanation.route[-2:] == (last, last):
+        return [table["remain"].format(place=words.place(last))]
+    again = explanation.objective.kind == "discounted" and last in explanation.route[:-1]
+    return [table["again"].format(place=words.place(last))] if again else []
 
 
 def _told(words: Vocabulary, steps: Sequence[Step], *, selective: bool) -> list[str]:
@@ -99,7 +117,15 @@ def _told(words: Vocabulary, steps: Sequence[Step], *, selective: bool) -> list[
 
 def _sentence(words: Vocabulary, place: str, step: Step) -> str:
     template: str = words.table("sentences")[place]
-    return template.format(reason=_reason(words, step) + _details(words, step), **_parts(words, step))
+    why = reason(words, step)
+    why += asides(words, step, alone=not why) + details(words, step)
+    return template.format(reason=_after(words, step, why), **_parts(words, step))
+
+
+def _after(words: Vocabulary, step: Step, why: str) -> str:
+    """Return a reason as it stands after the place: "at grid 5, 8 steps left, because …"."""
+    apposed = words.explanation.unfolded is not None and "," in words.place(step.state)
+    return f",{why}" if apposed and why.startswith(" ") else why
 
 
 def _parts(words: Vocabulary, step: Step) -> dict[str, str]:
@@ -111,115 +137,25 @@ def _parts(words: Vocabulary, step: Step) -> dict[str, str]:
     }
 
 
-def _reason(words: Vocabulary, step: Step) -> str:
-    """Return why: the words of the outcome claim and the flexibility claim together."""
-    claims = {claim.claim: claim for claim in step.claims}
-    key, outcome = _outcome(claims, chance=words.explanation.objective.kind != "cost")
-    if key in ("hopeless", "lost") and words.explanation.question.policy_values:
-        key = f"step_{key}"
-    flexible = "flexible" if "most flexible" in claims else "plain"
-    if outcome is None and "equally flexible" in claims and words.explanation.question.factors == {"constrictiveness"}:
-        flexible = "same"
-    template: str = words.table("reasons")[key][flexible]
-    filled = dict(words.objective)
-    if outcome is not None and key.startswith(("worse", "step_finite", "step_dead", "step_fail")):
-        filled |= _alternatives(words, outcome)
-    return template.format(**filled)
-
-
-def _outcome(claims: Mapping[str, Claim], *, chance: bool) -> tuple[str, Claim | None]:
-    """Return the row of the reasons' table for the outcome claim, and the claim."""
-    simple = {
-        "best": "best",
-        "among the best": "among",
-        "right start only": "start",
-        "hopeless": "lost" if chance else "hopeless",
-        "better step": "step_better",
-        "equal step": "step_equal",
-    }
-    for name, key in simple.items():
-        if name in claims:
-            return key + (_infinite_others(claims[name]) if name == "better step" else ""), claims[name]
-    for name, key in {"not best": "worse", "worse step": "step"}.items():
-        if name in claims:
-            fate = _measured(claims[name].evidence.taken).fate
-            return key + {"dead end": "_dead", "may fail": "_fail", None: "_finite"}[fate], claims[name]
-    return "open", None
-
-
-def _infinite_others(claim: Claim) -> str:
-    infinite = [_measured(other).fate is not None for other in claim.evidence.others]
-    return "_infinite" if all(infinite) else "_mixed" if any(infinite) else ""
-
-
-def _measured(row: Measured | Tally) -> Measured:
-    if not isinstance(row, Measured):
-        raise TypeError("A claim about outcomes must carry action values as evidence.")
-    return row
-
-
-def _alternatives(words: Vocabulary, claim: Claim) -> dict[str, str]:
-    """Return the better alternatives and their numbers in words."""
-    numbers, own = words.table("numbers"), _measured(claim.evidence.taken).number.value
-    values = [_measured(other).number.value for other in claim.evidence.others]
-    chance = words.explanation.objective.kind != "cost"
-    return {
-        "others": words.alternatives(claim.against),
-        "numbers": _pair(words, own, values),
-        "values": numbers["values"].format(
-            better=words.language.joined([plain(value, numbers, chance=chance) for value in values], "or")
-        ),
-    }
-
-
-def _pair(words: Vocabulary, own: float, values: Sequence[float]) -> str:
-    """Return better numbers beside the own: all of them, the best where others look like the own, or that it is close."""
-    numbers, objective = words.table("numbers"), words.explanation.objective
-    chance = objective.kind != "cost"
-    pair = contrasted(own, values, numbers, chance=chance)
-    if pair:
-        listed = words.language.joined(list(dict.fromkeys(pair[1])), "or")
-        return str(numbers["pair"].format(better=listed, own=pair[0]))
-    pair = contrasted(own, [max(values) if objective.maximise else min(values)], numbers, chance=chance)
-    return str(numbers["best"].format(better=pair[1][0], own=pair[0]) if pair else numbers["close"])
-
-
-def _details(words: Vocabulary, step: Step) -> str:
-    """Return what the alternatives would lead to, if it was asked for."""
-    if not words.explanation.question.detail:
-        return ""
-    details, parts = words.table("details"), []
-    for claim in step.claims:
-        if claim.claim == "only way on":
-            parts.append(details["only_way"])
-        if claim.claim == "avoids":
-            step_only = "_step" if words.explanation.question.policy_values else ""
-            for fate, key in (("dead end", "dead_end"), ("may fail", "may_fail" + step_only)):
-                actions = [row.action for row in claim.evidence.others if _measured(row).fate == fate]
-                if actions:
-                    parts.append(details[key].format(others=words.alternatives(actions)))
-    return "".join(parts)
-
-
 def _closing(words: Vocabulary, told: Sequence[Step]) -> list[str]:
     """Return what can be said of the untold steps, and of decisions off the route."""
     route, closing, asked = words.table("route"), words.explanation.closing, words.explanation.question
     noun, sentences = words.objective["noun"], []
     if not told:
         most = _largest_untold(words)
+        if not most and not asked.alpha and not asked.omega:
+            noun = words.language.joined([words.objectives[k].words["noun"] for k in range(_levels(words))], "or")
         key = "no_decision_after" if asked.omega and most else "no_decision_by" if most else "no_decision"
         sentences.append(route[key].format(noun=noun, largest=at_most(most)))
     elif closing.printed:
         key = "equivalent" if closing.largest_difference == 0.0 else "at_most"
         largest = "" if closing.largest_difference is None else at_most(closing.largest_difference)
         sentences.append(route[key].format(noun=noun, largest=largest))
-    unsure = _unsure(words)
-    if unsure:
-        sentences.append(
-            route["no_choice_sure_step" if asked.policy_values else "no_choice_sure"].format(
-                places=words.places(unsure)
-            )
-        )
+    for level in range(_levels(words)):
+        unsure = _unsure(words, level)
+        if unsure:
+            key = "no_choice_sure" + ("_further" if level else "") + ("_step" if asked.policy_values else "")
+            sentences.append(route[key].format(places=words.places(unsure)))
     if closing.off_route_open:
         sentences.append(route["off_route_least"].format(count=closing.off_route)) if closing.off_route else None
     elif closing.off_route:
@@ -239,26 +175,38 @@ def _largest_untold(words: Vocabulary) -> float:
     return max((high.value - low.value for high, low in spreads if high.finite and low.finite), default=0.0)
 
 
-def _unsure(words: Vocabulary) -> list[int]:
-    """Return the untold states of the route where every choice costs infinitely much: none is sure to arrive."""
-    objective = words.explanation.objective
-    if objective.kind != "cost" or objective.maximise:
+def _levels(words: Vocabulary) -> int:
+    return len(words.explanation.levels)
+
+
+def _unsure(words: Vocabulary, level: int) -> list[int]:
+    """Return the untold states of the route where every choice compared is infinitely bad: none is sure to arrive."""
+    objective = words.objectives[level].record
+    if objective.kind not in ("cost", "reward") or (objective.kind == "cost" and objective.maximise):
         return []
-    untold = [step for step in words.explanation.steps if step.critical is False and step.spread is not None]
-    return list(dict.fromkeys(step.state for step in untold if step.spread is not None and step.spread[1].infinite))
+    found = []
+    for step in words.explanation.steps:
+        spread = step.spread if level == 0 else next(iter(step.further_spreads[level - 1 : level]), None)
+        if step.critical is False and spread is not None:
+            best = spread[0 if objective.maximise else 1]
+            if best.infinite and (best.lower < 0) == objective.maximise:
+                found.append(step.state)
+    return list(dict.fromkeys(found))
 
 
 def _no_way(words: Vocabulary) -> str:
     route, explanation = words.table("route"), words.explanation
     place = words.place(explanation.start)
+    arrive = words.objective["arrive"]
     if explanation.in_the_way:
-        return str(route["no_way_hazards"].format(place=place, places=words.places(explanation.in_the_way)))
+        places = words.places(explanation.in_the_way)
+        return str(route["no_way_hazards"].format(arrive=arrive, place=place, places=places))
     reached = [state for state in explanation.circle if state != explanation.start]
     if explanation.circle_size <= 1:
-        return str(route["no_way_alone"].format(place=place))
+        return str(route["no_way_alone"].format(arrive=arrive, place=place))
     if explanation.circle_size <= 6:
-        return str(route["no_way_few"].format(place=place, places=words.places(reached)))
-    return str(route["no_way_many"].format(place=place, count=explanation.circle_size))
+        return str(route["no_way_few"].format(arrive=arrive, place=place, places=words.places(reached)))
+    return str(route["no_way_many"].format(arrive=arrive, place=place, count=explanation.circle_size))
 
 
 def _circle(words: Vocabulary) -> str:
@@ -267,7 +215,7 @@ def _circle(words: Vocabulary) -> str:
     if not explanation.circle_certain:
         key += "_perhaps"
     places = words.places(explanation.circle, explanation.circle_size)
-    return str(words.table("route")[key].format(places=places))
+    return str(words.table("route")[key].format(arrive=words.objective["arrive"], places=places))
 
 
 def _chances(words: Vocabulary) -> list[str]:
@@ -279,5 +227,6 @@ def _chances(words: Vocabulary) -> list[str]:
     if explanation.route_probability is not None and explanation.route_probability < 0.5:
         sentences.append(route["route_chance"].format(percent=percent(explanation.route_probability)))
     if explanation.arrival is not None and explanation.arrival.upper < 0.5:
-        sentences.append(route["arrival_chance"].format(percent=percent(explanation.arrival.value)))
+        said = route["arrival_chance"].format(percent=percent(explanation.arrival.value), **words.objective)
+        sentences.append(said)
     return sentences

@@ -28,7 +28,7 @@ def contrasted(
     """Return `own` and `others` in words that differ, or None where two decimals cannot tell them apart."""
     numbers = [own, *others]
     for digits in (1, 2):
-        texts = [_spell(value, digits, words, chance) for value in numbers]
+        texts = [_spell(value, digits, words, chance, signed=min(numbers) < 0) for value in numbers]
         faithful = digits == 2 or all(_faithful(value, digits, chance) for value in numbers)
         if faithful and all(text != texts[0] for text in texts[1:]):
             return texts[0], texts[1:]
@@ -42,13 +42,15 @@ def _faithful(value: float, digits: int, chance: bool) -> bool:
     return not (rounded == 0 != value or (chance and rounded == 1 != value))
 
 
-def _spell(value: float, digits: int, words: Mapping[str, str], chance: bool) -> str:
+def _spell(value: float, digits: int, words: Mapping[str, str], chance: bool, *, signed: bool = False) -> str:
     if math.isinf(value):
-        return words["infinite"]
+        return words["infinite" if value > 0 else "infinite_negative"]
     if not _faithful(value, digits, chance) and digits == 2:
-        return words["nearly_one"] if chance and value > 0.5 else words["tiny"]
-    text = f"{value:.{digits}f}"
-    return (text.rstrip("0").rstrip(".") if "." in text else text) or "0"
+        if value < 0:
+            return words["tiny_negative"]
+        return words["nearly_one"] if chance and value > 0.5 else words["tiny_positive" if signed else "tiny"]
+    text = f"{value + 0.0:.{digits}f}"
+    return text.rstrip("0").rstrip(".")
 
 
 def percent(share: float) -> str:

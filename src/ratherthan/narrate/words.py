@@ -12,6 +12,7 @@ from typing import Any
 
 from ratherthan.errors import InputError
 from ratherthan.explain.explanation import Explanation, ObjectiveRecord
+from ratherthan.model.lexicon import Lexicon
 from ratherthan.narrate import english
 
 __all__ = ["Language", "Vocabulary", "language", "vocabulary"]
@@ -26,6 +27,8 @@ class Language:
     joined: Callable[[Sequence[str], str], str]
     verb_phrase_after: Callable[[str, str], str]
     qualified: Callable[[str, str], str]
+    shortened: Callable[[str], str]
+    counted: Callable[[str], str]
 
 
 @cache
@@ -46,7 +49,17 @@ def language(code: str) -> Language:
         joined=english.joined,
         verb_phrase_after=english.verb_phrase_after,
         qualified=english.qualified,
+        shortened=english.shortened,
+        counted=english.counted,
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """An objective and its words: best, best_flexible, among, better, worse, equal, noun and so on, as the templates list."""
+
+    record: ObjectiveRecord
+    words: Mapping[str, str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,13 +70,18 @@ class Vocabulary:
     ----------
     explanation : Explanation
     language : Language
-    objective : mapping of str to str
-        The objective's words: best, best_flexible, among, better, worse, equal, noun.
+    objectives : tuple of Wanted
+        Words for each level of the objective, then for each further objective.
     """
 
     explanation: Explanation
     language: Language
-    objective: Mapping[str, str]
+    objectives: tuple[Wanted, ...]
+
+    @property
+    def objective(self) -> Mapping[str, str]:
+        """The words of the first level."""
+        return self.objectives[0].words
 
     def table(self, name: str) -> Mapping[str, Any]:
         """Return one table of the templates."""
@@ -137,19 +155,76 @@ def _without_number(action: str) -> tuple[str, str]:
 def vocabulary(explanation: Explanation) -> Vocabulary:
     """Return the words of an explanation: its lexicon's, and the language's where that says nothing."""
     spoken = language(explanation.lexicon.language)
-    objective = _objective_words(explanation.objective, spoken.templates["objectives"])
-    own = explanation.lexicon.objectives.get(_own_key(explanation.objective), {})
-    return Vocabulary(explanation=explanation, language=spoken, objective={**objective, **own})
+    records = (*explanation.levels, *(further.objective for further in explanation.also))
+    lexicon, shorten = explanation.lexicon, spoken.shortened
+    words = [_objective_words(record, spoken.templates, lexicon, shorten) for record in records]
+    words = _told_apart(words, _properties(explanation), spoken.templates["phrases"])
+    return Vocabulary(
+        explanation=explanation,
+        language=spoken,
+        objectives=tuple(Wanted(record=record, words=own) for record, own in zip(records, words, strict=True)),
+    )
 
 
-def _own_key(objective: ObjectiveRecord) -> str:
-    return (objective.reward or "steps") if objective.kind == "cost" else objective.kind
+def _properties(explanation: Explanation) -> list[str]:
+    """Return the property of each level, then of each further objective."""
+    levels = re.split(r"(?<=\])\s*then\s+", explanation.property) if len(explanation.levels) > 1 else []
+    own = levels if len(levels) == len(explanation.levels) else [explanation.property] * len(explanation.levels)
+    return [*own, *(further.property for further in explanation.also)]
 
 
-def _objective_words(objective: ObjectiveRecord, tables: Mapping[str, Any]) -> dict[str, str]:
-    direction = "max" if objective.maximise else "min"
-    reward = objective.reward or ""
-    key = _own_key(objective).lower() if objective.kind == "cost" else objective.kind
-    known = objective.kind != "cost" or key in ("distance", "time", "steps")
-    words: Mapping[str, str] = tables[key if known else "cost"][direction]
-    return {name: text.replace("{reward}", reward.replace("_", " ")) for name, text in words.items()}
+def _told_apart(
+    words: list[dict[str, str]], properties: Sequence[str], phrases: Mapping[str, str]
+) -> list[dict[str, str]]:
+    """Let numbers carry the name of their objective where two objectives have the same words."""
+    comparatives, nouns = ([own[key] for own in words] for key in ("better", "noun"))
+    told = []
+    for own, text in zip(words, properties, strict=True):
+        same = nouns.count(own["noun"]) > 1
+        if comparatives.count(own["better"]) > 1:
+            unit = own["unit"] + phrases["named"].replace("{what}", text if same else own["noun"])
+            own = {**own, "unit": unit}
+        told.append({**own, "amount": own["amount"] + phrases["which"].replace("{what}", text)} if same else own)
+    return told
+
+
+_LISTED = ("distance", "time", "steps", "risk", "collisions")
+
+
+def _objective_words(
+    record: ObjectiveRecord, templates: Mapping[str, Any], lexicon: Lexicon, shorten: Callable[[str], str]
+) -> dict[str, str]:
+    """Return the words of an objective, those of a lexicon first."""
+    direction = "max" if record.maximise else "min"
+    if record.kind in ("cost", "reward"):
+        key = record.reward or "steps"
+        words = templates["rewards"][_table_of(key)][direction]
+    else:
+        key = record.kind
+        words = templates["objectives"][key][direction]
+    own = lexicon.objectives.get(key, {})
+    short = {f"{name}_one": shorten(own[name]) for name in ("best", "among", "better", "worse") if name in own}
+    words = {**words, **short}
+    arriving = templates["arriving"]
+    filled = {**words, **arriving.get(record.kind, arriving["usual"])}
+    reward, formula = _reward_in_words(record.reward, templates["phrases"]), (record.formula or "").replace('"', "")
+    plain = {
+        name: text.replace("{reward}", reward).replace("{formula}", formula) if "{" in text else text
+        for name, text in filled.items()
+    }
+    return {**plain, **own}
+
+
+def _table_of(reward: str) -> str:
+    """Return which table of words belongs to a reward."""
+    name = reward.lower()
+    if name in _LISTED:
+        return name
+    return "count" if re.fullmatch(r"[\w ]*[^\W\d_]{2}s", name) and not name.endswith(("ss", "us", "is")) else "other"
+
+
+def _reward_in_words(reward: str | None, phrases: Mapping[str, str]) -> str:
+    """Return a reward as words: "distance plus 10 times risk"."""
+    if reward is None:
+        return phrases["steps"]
+    return reward.replace("_", " ").replace(" + ", phrases["plus"]).replace(" * ", phrases["times"])

@@ -12,9 +12,23 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ratherthan.model.mdp import Floats
+from ratherthan.model.mdp import Floats, Ints
 
-__all__ = ["Factors", "Rows", "eliminate", "elimination_tree", "fill_of", "substitute", "sweep"]
+__all__ = [
+    "Factors",
+    "Ordered",
+    "Rows",
+    "drift_rows",
+    "eliminate",
+    "elimination_tree",
+    "fill_of",
+    "gather_rows",
+    "ordered_rows",
+    "substitute",
+    "sweep",
+    "window_pass",
+    "window_residual",
+]
 
 Ints64 = npt.NDArray[np.int64]
 
@@ -179,3 +193,194 @@ def sweep(lower: Rows, right: Floats) -> Floats:
             total += lower.entry[p] * x[lower.column[p]]
         x[i] = total
     return x
+
+
+class Ordered(NamedTuple):
+    """A system's rows with the nodes in another order, loops to the own node taken out, what is left scaled to sum to 1."""
+
+    node_to_rows: npt.NDArray[np.int32]  # [n+1]
+    row_to_branches: npt.NDArray[np.int32]  # [m+1]
+    target: npt.NDArray[np.int32]
+    probability: Floats
+    cost: Floats  # [m]
+    source: npt.NDArray[np.int32]  # [m], the row of the system
+
+
+def ordered_rows(
+    rows: tuple[Ints64, Ints64, Ints64], probability: Floats, cost: Floats, order: Ints64, rank: Ints64
+) -> Ordered:
+    """Return the rows of a system in the `order` of its nodes; `rank` is the place of each node (and sink) in it.
+
+    `rows` are node_to_rows, row_to_branches and target.
+    """
+    node_to_rows, row_to_branches, target = rows
+    n, m = len(node_to_rows) - 1, len(row_to_branches) - 1
+    rows_of_node = np.zeros(n + 1, np.int32)
+    branches_of_row = np.zeros(m + 1, np.int32)
+    after = np.zeros(len(target), np.int32)
+    chance = np.zeros(len(target), np.float64)
+    paid = np.zeros(m, np.float64)
+    source = np.zeros(m, np.int32)
+    row, branch = 0, 0
+    for i in range(n):
+        node = order[i]
+        for a in range(node_to_rows[node], node_to_rows[node + 1]):
+            leave = 0.0
+            for b in range(row_to_branches[a], row_to_branches[a + 1]):
+                if target[b] != node:
+                    leave += probability[b]
+            for b in range(row_to_branches[a], row_to_branches[a + 1]):
+                if target[b] != node:
+                    after[branch] = rank[target[b]]
+                    chance[branch] = probability[b] / leave
+                    branch += 1
+            paid[row] = cost[a] / leave
+            source[row] = a
+            row += 1
+            branches_of_row[row] = branch
+        rows_of_node[i + 1] = row
+    return Ordered(rows_of_node, branches_of_row, after[:branch], chance[:branch], paid, source)
+
+
+def window_pass(
+    rows: Ordered,
+    layers: Ints64,
+    values: Floats,
+    taken: npt.NDArray[np.int32],
+    width: int,
+    tolerance: float,
+    step: float,
+    budget: int,
+) -> int:
+    """Solve window after window of `width` layers, each until no sweep changes a value by more than `tolerance`.
+
+    A sweep that chooses is followed by up to three that keep to what was chosen. `values` (those of the sinks behind them) and
+    the row `taken` at each node leave improved. A positive `step` says that there are no values yet: a node then begins with
+    the least value of the nodes before it that its first row leads to, and a step more. Returns how many nodes were visited, a
+    number above `budget` if it was spent.
+    """
+    nodes, last = len(rows.node_to_rows) - 1, len(layers) - 1
+    begun, spent = 0, 0
+    for layer in range(0, last, max(width // 2, 1)):
+        begin, end = layers[layer], layers[min(layer + width, last)]
+        if step > 0.0:
+            ahead = layers[min(layer + width + width // 2, last)]  # what the window looks at must have values, too
+            for s in range(begun, ahead):
+                least = np.inf
+                first = rows.node_to_rows[s]
+                for b in range(rows.row_to_branches[first], rows.row_to_branches[first + 1]):
+                    t = rows.target[b]
+                    if (t < s or t >= nodes) and values[t] < least:
+                        least = values[t]
+                values[s] = step + (least if least < np.inf else values[max(s - 1, 0)])
+            begun = max(begun, ahead)
+        keeping = 0  # how many sweeps more keep to what was chosen
+        while spent <= budget:
+            change = 0.0
+            for s in range(begin, end):
+                low, high = rows.node_to_rows[s], rows.node_to_rows[s + 1]
+                if keeping > 0:
+                    low = taken[s]
+                    high = low + 1
+                best = np.inf
+                for a in range(low, high):
+                    x = rows.cost[a]
+                    for b in range(rows.row_to_branches[a], rows.row_to_branches[a + 1]):
+                        x += rows.probability[b] * values[rows.target[b]]
+                    if x < best:
+                        best = x
+                        taken[s] = a
+                change = max(change, abs(best - values[s]))
+                values[s] = best
+            spent += end - begin
+            if keeping == 0:
+                if not change > tolerance:
+                    break
+                keeping = 3
+            else:
+                keeping = keeping - 1 if change > 0.5 * tolerance else 0
+    return spent
+
+
+def window_residual(rows: Ordered, values: Floats, taken: npt.NDArray[np.int32]) -> float:
+    """Return max |Tv - v|; the best row for the values as they are leaves in `taken`."""
+    largest = 0.0
+    for s in range(len(rows.node_to_rows) - 1):
+        best = np.inf
+        for a in range(rows.node_to_rows[s], rows.node_to_rows[s + 1]):
+            x = rows.cost[a]
+            for b in range(rows.row_to_branches[a], rows.row_to_branches[a + 1]):
+                x += rows.probability[b] * values[rows.target[b]]
+            if x < best:
+                best = x
+                taken[s] = a
+        largest = max(largest, abs(best - values[s]))
+    return largest
+
+
+def gather_rows(
+    rows: Ints64, own: Ints64, index: tuple[Ints, Ints], probability: Floats, node: Ints64
+) -> tuple[Ints64, Ints64, Ints64, Floats]:
+    """Return the rows of a model that leave their node: which of `rows` they are, offsets, targets, probabilities.
+
+    `own` is the node of each row, `node` that of each state; `index` holds choice_to_branches and branch_to_target.
+    """
+    choice_to_branches, branch_to_target = index
+    total = 0
+    for i in range(len(rows)):
+        total += choice_to_branches[rows[i] + 1] - choice_to_branches[rows[i]]
+    kept = np.zeros(len(rows), np.int64)
+    offsets = np.zeros(len(rows) + 1, np.int64)
+    target = np.zeros(total, np.int64)
+    chance = np.zeros(total, np.float64)
+    count, filled = 0, 0
+    for i in range(len(rows)):
+        leaves = False
+        at = filled
+        for b in range(choice_to_branches[rows[i]], choice_to_branches[rows[i] + 1]):
+            t = node[branch_to_target[b]]
+            target[at] = t
+            chance[at] = probability[b]
+            leaves = leaves or t != own[i]
+            at += 1
+        if leaves:
+            filled = at
+            kept[count] = i
+            count += 1
+            offsets[count] = filled
+    return kept[:count], offsets[: count + 1], target[:filled], chance[:filled]
+
+
+def drift_rows(
+    own: Ints64,
+    row_to_branches: Ints64,
+    target: Ints64,
+    probability: Floats,
+    paid: tuple[Floats, Floats],
+    parts: Floats,
+) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
+    """Return, for each row of a node `own`, its drift, the weight of its rounding error, and whether anything moves.
+
+    `paid` is what each row pays and the size of that; `parts` are the values, ``[p, n+2]``, which sum to x, those of the two sinks behind the nodes'.
+    """
+    cost, sizes = paid
+    rows = len(cost)
+    total, weight, moved = np.zeros(rows), np.zeros(rows), np.zeros(rows, np.bool_)
+    for a in range(rows):
+        s = own[a]
+        drift, size = 0.0, 0.0
+        moves = sizes[a] > 0.0
+        for b in range(row_to_branches[a], row_to_branches[a + 1]):
+            t = target[b]
+            step, wide = 0.0, 0.0
+            for p in range(len(parts)):
+                further = parts[p, t] - parts[p, s]
+                step += further
+                wide += abs(further)
+            drift += probability[b] * step
+            size += probability[b] * wide
+            moves = moves or wide > 0.0
+        total[a] = cost[a] + drift
+        weight[a] = sizes[a] + size
+        moved[a] = moves
+    return total, weight, moved

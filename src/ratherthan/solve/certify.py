@@ -20,6 +20,10 @@ components serve to find x, not to believe it. Upper: ρ ≤ ρ^π for a policy 
 *Largest expected cost, largest probability.* If x ≥ 0 and never_rises over all rows, then for every policy
 x ≥ E[cost of k steps] + E[x(Xₖ)] ≥ E[cost of k steps] + P[sink 1 within k steps], hence x ≥ ρ. Lower: ρ ≥ ρ^π.
 
+*Sums of rewards of either sign.* Every policy that counts is absorbed after a finite expected number of steps (`gathering`), so
+never_rises over all rows proves x ≥ ρ for a largest value, and never_falls x ≤ ρ for a least, whatever the signs of x and of
+what is paid. So it is for discounted sums, where every policy is absorbed.
+
 The vectors to check are the solver's values and a margin below or above them, found in `margins` from linear solves. A
 vector that fails is tried again with a wider margin or given up, never reported.
 
@@ -39,9 +43,19 @@ import numpy.typing as npt
 from ratherthan.model.mdp import Floats
 from ratherthan.solve.linear import Inverse
 from ratherthan.solve.margins import margin_of
-from ratherthan.solve.system import System, drift
+from ratherthan.solve.system import System, certain_drift, drift
 
-__all__ = ["Parts", "Tight", "chain_bounds", "chain_margin", "never_falls", "never_rises", "optimum_bound", "outward"]
+__all__ = [
+    "Parts",
+    "Tight",
+    "chain_bounds",
+    "chain_margin",
+    "fits",
+    "never_falls",
+    "never_rises",
+    "optimum_bound",
+    "outward",
+]
 
 Nodes = npt.NDArray[np.int64]
 
@@ -61,11 +75,12 @@ class Tight(NamedTuple):
     values: Parts
     rows: Nodes  # [n]
     inverse: Inverse
+    scale: Floats | None = None  # [n], as in Solved
 
     @property
     def widest(self) -> float:
         """Which margin is too wide to be of use."""
-        return 1e3 * float(self.values.high.max())
+        return 1e3 * float((self.values.high if self.scale is None else self.scale).max())
 
 
 def never_falls(system: System, *parts: Floats) -> bool:
@@ -80,17 +95,27 @@ def never_rises(system: System, *parts: Floats) -> bool:
     return bool((total + error <= 0.0).all())
 
 
+def fits(system: System, values: Floats, sign: float) -> bool:
+    """Return whether x itself passes a check: it never falls (sign 1), or never rises (-1), provably or without rounding.
+
+    Where signed sums cancel, x may be 0, and no margin around it is small. It need not be rounded, though.
+    """
+    total, error = drift(system, values)
+    plain, exact = certain_drift(system, values)
+    return bool(((sign * total - error >= 0.0) | (exact & (sign * plain >= 0.0))).all())
+
+
 def nowhere_negative(values: Parts, margin: Floats) -> bool:
     """Return whether values + margin is provably at least 0 everywhere."""
     total = values.high + np.nextafter(values.low + margin, -np.inf)
     return bool((total >= 0.0).all())
 
 
-def outward(values: Parts, margin: Floats) -> tuple[Floats, Floats]:
-    """Return values - margin and values + margin, rounded outward; below 0 is 0, as no value is negative."""
+def outward(values: Parts, margin: Floats, *, signed: bool = False) -> tuple[Floats, Floats]:
+    """Return values - margin and values + margin, rounded outward; below 0 is 0 where no value is negative."""
     lower = np.nextafter(values.high + np.nextafter(values.low - margin, -np.inf), -np.inf)
     upper = np.nextafter(values.high + np.nextafter(values.low + margin, np.inf), np.inf)
-    return np.maximum(lower, 0.0), upper
+    return lower if signed else np.maximum(lower, 0.0), upper
 
 
 def chain_bounds(system: System, found: Tight) -> tuple[Floats | None, Floats | None]:
@@ -107,12 +132,15 @@ def chain_bounds(system: System, found: Tight) -> tuple[Floats | None, Floats | 
     -------
     lower, upper : array of float, ``[n]``, or None
     """
+    plain = found.values.high + found.values.low
+    if system.signed and fits(system, plain, 1.0) and fits(system, plain, -1.0):
+        return plain, plain
     lower, upper = None, None
     for scale in SCALES:
         margin = chain_margin(system, found, scale)
         if margin is None:
             break
-        below, above = outward(found.values, margin)
+        below, above = outward(found.values, margin, signed=system.signed)
         if lower is None and never_falls(system, *found.values, -margin):
             lower = below
         if upper is None and never_rises(system, *found.values, margin):
@@ -151,15 +179,17 @@ def optimum_bound(core: System, whole: System, node: Nodes, found: Tight, maximi
     total, error = drift(core, *found.values)
     gap = -total if maximise else total
     values = Parts(found.values.high[node], found.values.low[node])
+    if core.signed and fits(whole, values.high + values.low, -1.0 if maximise else 1.0):
+        return values.high + values.low
     for scale in SCALES:
         slack = scale * (2.0 * error + np.maximum(-gap, 0.0))
         collapsed = margin_of(core, slack, np.maximum(gap, 0.0), (found.rows, found.inverse), found.widest)
         if collapsed is None:
             return None
         margin = collapsed[node]
-        lower, upper = outward(values, margin)
+        lower, upper = outward(values, margin, signed=core.signed)
         if maximise:
-            if nowhere_negative(values, margin) and never_rises(whole, *values, margin):
+            if (core.signed or nowhere_negative(values, margin)) and never_rises(whole, *values, margin):
                 return upper
         elif never_falls(whole, *values, -margin):
             return lower

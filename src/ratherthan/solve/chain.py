@@ -3,7 +3,7 @@
 Under a policy a model is a Markov chain: a state's row mixes the rows of its choices. The graph of the chain decides where
 the goal is reached with probability 0 or 1, and where nothing is paid on the way; the rest is one linear system, from every
 state of which the run is absorbed. With the expected cost, a state that reaches the goal with probability below 1 has the
-value ∞, whatever it pays.
+value ∞, whatever it pays; with the reward gathered until a goal that must be reached it has the value -∞.
 
 A state of which the policy says nothing must not be reached. Where it is not reached from the initial states, it and all
 states that may lead to it are left undecided: lower bound -∞, upper bound ∞.
@@ -23,11 +23,11 @@ from ratherthan.model.index import Index, branches_of, build_index
 from ratherthan.model.mdp import Bools, Floats
 from ratherthan.model.policy import Policy
 from ratherthan.solve.certify import Parts, Tight, chain_bounds, never_falls, never_rises, outward
+from ratherthan.solve.goal import Goal, Kind
 from ratherthan.solve.linear import solve_chain
 from ratherthan.solve.rewards import SMALLEST
-from ratherthan.solve.sweeps import Sweeps, sweep_from_below, upper_vector
+from ratherthan.solve.sweeps import Sweeps, sweep_from_below, swept_between, upper_vector
 from ratherthan.solve.system import System, build_system
-from ratherthan.solve.task import Goal
 
 __all__ = ["Chain", "Evaluated", "Guess", "chain_of", "evaluated", "nodes_of", "refuse_unsaid"]
 
@@ -41,8 +41,9 @@ class Chain:
     index : Index
         Its graph; choice s is the row of state s.
     probability : array of float, ``[K]``
-    cost : array of float, ``[S]``
-    costly : array of bool, ``[S]``
+    cost, size : array of float, ``[S]``
+    costly, exact : array of bool, ``[S]``
+        Where something is paid, and where that was not rounded.
     said : array of bool, ``[S]``
         Where the policy says something.
     """
@@ -50,25 +51,32 @@ class Chain:
     index: Index
     probability: Floats  # [K]
     cost: Floats  # [S]
+    size: Floats  # [S]
     costly: Bools  # [S]
+    exact: Bools  # [S]
     said: Bools  # [S]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Evaluated:
-    """The values of a policy with bounds; `open` is where they were computed, elsewhere they are exact (or undecided)."""
+    """The values of a policy with bounds; `open` is where they were computed, elsewhere they are exact; undecided where `lost`."""
 
     values: Floats  # [S]
     lower: Floats  # [S]
     upper: Floats  # [S]
     open: Bools  # [S]
+    lost: Bools  # [S]
     solves: int
 
 
 def chain_of(goal: Goal, policy: Policy) -> Chain:
     """Return the model under a policy."""
     index = goal.index
-    weights = policy.weights(goal.mdp)
+    if policy.chance is None:
+        weights = np.zeros(index.choices)
+        weights[policy.choice[policy.choice >= 0]] = 1.0
+    else:
+        weights = policy.chance
     sums = np.add.reduceat(weights, index.state_to_choices[:-1])
     taken = np.flatnonzero(weights > 0.0)
     state = index.choice_to_state[taken]
@@ -79,13 +87,16 @@ def chain_of(goal: Goal, policy: Policy) -> Chain:
     np.cumsum(np.bincount(state, weights=lengths, minlength=index.states).astype(np.int64), out=row_to_branches[1:])
     chain = build_index(np.arange(index.states + 1), row_to_branches, index.branch_to_target[branches])
     cost = np.bincount(state, weights=share * goal.cost[taken], minlength=index.states)
+    size = np.bincount(state, weights=share * goal.size[taken], minlength=index.states)
     costly = np.zeros(index.states, dtype=np.bool_)
     costly[state[goal.costly[taken]]] = True
     return Chain(
         index=chain,
-        probability=goal.mdp.branch_to_probability[branches] * np.repeat(share, lengths),
-        cost=np.where(costly, np.maximum(cost, SMALLEST), 0.0),
+        probability=goal.probability[branches] * np.repeat(share, lengths),
+        cost=np.where(costly, cost if goal.signed else np.maximum(cost, SMALLEST), 0.0),
+        size=np.where(costly, size, 0.0),
         costly=costly,
+        exact=np.bincount(state[goal.exact[taken] & (share == 1.0)], minlength=index.states) == 1,
         said=sums > 0.0,
     )
 
@@ -140,10 +151,13 @@ def evaluated(goal: Goal, chain: Chain, guess: Guess | None = None) -> Evaluated
     lost = graph.can_reach(index, running & ~chain.said, running)
     possible = graph.can_reach(index, goal.target, goal.through)
     sure = graph.cannot_miss(index, goal.target, goal.through)
-    if goal.counts_cost:
+    if goal.kind is Kind.DISCOUNTED:
+        open_ = graph.can_reach(index, running & chain.costly, running) & running & ~lost
+        fixed = np.zeros(index.states)
+    elif goal.counts_cost:
         pays = graph.can_reach(index, sure & running & chain.costly, sure & running)
         open_ = sure & pays & ~lost
-        fixed = np.where(sure, 0.0, np.inf)
+        fixed = np.where(sure, 0.0, goal.unreached)
     else:
         open_ = possible & ~sure & ~lost
         fixed = np.where(sure, 1.0, 0.0)
@@ -153,7 +167,7 @@ def evaluated(goal: Goal, chain: Chain, guess: Guess | None = None) -> Evaluated
             fixed[open_], lower[open_], upper[open_] = _computed(goal, chain, open_, fixed, guess)
         solves = 1
     fixed[lost], lower[lost], upper[lost] = 0.0, -np.inf, np.inf
-    return Evaluated(values=fixed, lower=lower, upper=upper, open=open_, solves=solves)
+    return Evaluated(values=fixed, lower=lower, upper=upper, open=open_, lost=lost, solves=solves)
 
 
 def nodes_of(open_: Bools, fixed: Floats) -> npt.NDArray[np.int64]:
@@ -168,26 +182,45 @@ def _computed(
     goal: Goal, chain: Chain, open_: Bools, fixed: Floats, guess: Guess | None
 ) -> tuple[Floats, Floats, Floats]:
     """Return the values of the open states and their bounds."""
-    system = build_system(chain.index, chain.probability, chain.cost, np.flatnonzero(open_), nodes_of(open_, fixed))
-    most = np.full(system.nodes, np.inf if goal.counts_cost else 1.0)
+    system = build_system(
+        chain.index,
+        chain.probability,
+        chain.cost,
+        np.flatnonzero(open_),
+        nodes_of(open_, fixed),
+        size=chain.size,
+        exact=chain.exact,
+        signed=goal.signed,
+        discount=goal.discount,
+    )
+    least, most = _widest(goal, system.nodes)
     if guess is not None:
         parts, margin = Parts(guess.high[open_], guess.low[open_]), guess.margin[open_]
         if never_falls(system, *parts, -margin) and never_rises(system, *parts, margin):
-            lower, upper = outward(parts, margin)
+            lower, upper = outward(parts, margin, signed=system.signed)
             return np.clip(parts.high + parts.low, lower, upper), lower, np.minimum(upper, most)
     solved = solve_chain(system)
     if solved is None:
-        return _swept(goal, system, most)
-    proved = chain_bounds(system, Tight(Parts(solved.high, solved.low), np.arange(system.nodes), solved.inverse))
-    lower = np.zeros(system.nodes) if proved[0] is None else proved[0]
+        return _swept(goal, system, (least, most))
+    tight = Tight(Parts(solved.high, solved.low), np.arange(system.nodes), solved.inverse, solved.scale)
+    proved = chain_bounds(system, tight)
+    lower = least if proved[0] is None else proved[0]
     upper = most if proved[1] is None else np.minimum(proved[1], most)
     return np.clip(solved.high + solved.low, lower, upper), lower, upper
 
 
-def _swept(goal: Goal, system: System, most: Floats) -> tuple[Floats, Floats, Floats]:
+def _widest(goal: Goal, count: int) -> tuple[Floats, Floats]:
+    """Return the bounds that hold without a proof."""
+    return np.full(count, -np.inf if goal.signed else 0.0), np.full(count, np.inf if goal.counts_cost else 1.0)
+
+
+def _swept(goal: Goal, system: System, widest: tuple[Floats, Floats]) -> tuple[Floats, Floats, Floats]:
     """Return values and bounds by value iteration, where no equation solver coped with the system."""
-    settings = Sweeps()
+    settings, (least, most) = Sweeps(), widest
+    if goal.signed:
+        values, below, above = swept_between(system, settings, maximise=goal.maximise)
+        return values, least if below is None else below, most if above is None else above
     swept = sweep_from_below(system, goal.maximise, settings)
-    lower = swept.values if never_falls(system, swept.values) else np.zeros(system.nodes)
+    lower = swept.values if never_falls(system, swept.values) else least
     above = upper_vector(system, swept.values, goal.maximise, None if goal.counts_cost else settings)
     return swept.values, lower, most if above is None else np.minimum(above, most)

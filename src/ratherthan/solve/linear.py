@@ -65,6 +65,12 @@ class Solved(NamedTuple):
     inverse: Inverse
     method: Method
     exactness: float  # the largest drift, in units of its rounding error; ∞ where the chain leaves too slowly to tell
+    scale: Floats | None = None  # [n], of values with signs: the expected sum of absolute payments
+
+    @property
+    def size(self) -> Floats:
+        """How large the numbers are that the values are made of, ``[n]``: the values themselves where none is negative."""
+        return self.high if self.scale is None else self.scale
 
 
 def methods_for(system: System) -> tuple[Method, ...]:
@@ -119,7 +125,7 @@ def _refined(system: System, method: Method, inverse: Inverse) -> Solved | None:
     total = drift(system, high)[0]
     slow = not method.entrywise and not _settled(system, inverse)
     best: Solved | None = None
-    vain = 0
+    vain, scale = 0, _scale(system, inverse)
     for _ in range(MOST_REFINEMENTS):
         step = inverse(total)
         if not np.isfinite(step).all():
@@ -130,18 +136,23 @@ def _refined(system: System, method: Method, inverse: Inverse) -> Solved | None:
         ratio = np.divide(np.abs(total), error, out=np.zeros_like(total), where=total != 0.0)
         exactness = np.inf if slow else float(ratio.max())
         if best is None:
-            first = best = Solved(high, low, inverse, method, exactness)
+            first = best = Solved(high, low, inverse, method, exactness, scale)
         elif exactness < best.exactness:
             vain = vain if exactness > 0.5 * best.exactness else 0
-            best = Solved(high, low, inverse, method, exactness)
+            best = Solved(high, low, inverse, method, exactness, scale)
         vain += 1
         if slow or best.exactness <= 1.0 or vain > MOST_VAIN:
             break
     if best is not None and method.entrywise:
         doubt = inverse(np.abs(total) + error)
-        if not (doubt <= MOST_DOUBT * best.high).all():
+        if not (doubt <= MOST_DOUBT * best.size).all():
             return first._replace(exactness=np.inf)
     return best
+
+
+def _scale(system: System, inverse: Inverse) -> Floats | None:
+    """Return the expected sum of absolute payments along a chain, None where no payment is negative."""
+    return np.abs(inverse(system.magnitude)) if system.signed else None
 
 
 def _settled(system: System, inverse: Inverse) -> bool:

@@ -8,15 +8,17 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ratherthan.model.mdp import Floats
+from ratherthan.model.mdp import Bools, Floats
 from ratherthan.model.policy import Policy
 from ratherthan.solve.certify import Parts, Tight, chain_margin, never_falls, never_rises, optimum_bound
 from ratherthan.solve.chain import Evaluated, Guess, chain_of, evaluated, nodes_of
+from ratherthan.solve.gathering import loops_in_doubt, most_reward
+from ratherthan.solve.goal import Goal, Kind, Task
+from ratherthan.solve.levelling import levelled, raised, without_cancelling
 from ratherthan.solve.policy_iteration import Found, PolicyIteration, iterate_policies
-from ratherthan.solve.sweeps import Sweeps, arriving_rows, sweep_from_below, upper_vector
+from ratherthan.solve.sweeps import Sweeps, Swept, arriving_rows, sweep_from_below, swept_between, upper_vector
 from ratherthan.solve.system import System, build_system, drift, rows_of
-from ratherthan.solve.task import Task
-from ratherthan.solve.tied import first_tied, tied_choices
+from ratherthan.solve.tied import first_tied, fixed_best, tied_choices
 
 __all__ = ["Method", "Optimum", "optimum"]
 
@@ -37,47 +39,96 @@ class Optimum(NamedTuple):
     lower: Floats  # [S]
     upper: Floats  # [S]
     choice: Nodes  # [S]
+    tied: Bools  # [C], the choices that cannot be told from the best
     attained: Evaluated
     engine: str
     solves: int
     residual: float
+    task: Task
 
 
-def optimum(task: Task, method: Method, progress: Progress | None = None) -> Optimum:
+def optimum(task: Task, method: Method | None, progress: Progress | None = None, *, finest: int = 0) -> Optimum:
     """Return the optimum of a task.
 
     Parameters
     ----------
     task : Task
-    method : PolicyIteration or Sweeps
+    method : PolicyIteration or Sweeps, optional
+        Without it the program chooses: windowed sweeps where they suit, else policy iteration.
     progress : callable, optional
+    finest : int
+        Which of the tolerances for ties to begin with; the later, the finer.
     """
     with np.errstate(all="ignore"):  # numbers beyond doubles become ±∞ or NaN, which no check lets pass
-        return _optimum(task, method, progress)
+        return _optimum(task, method, progress, finest)
 
 
-def _optimum(task: Task, method: Method, progress: Progress | None) -> Optimum:
+def _optimum(task: Task, method: Method | None, progress: Progress | None, finest: int) -> Optimum:
     """Return the optimum of a task."""
     goal = task.goal
     if not task.open.any():
+        tied = fixed_best(task)
         choice = first_tied(task, task.internal | task.attaining)
         attained = evaluated(goal, chain_of(goal, Policy(choice=choice)))
-        return Optimum(task.fixed, task.fixed, task.fixed, choice, attained, "graph search", 0, 0.0)
+        return Optimum(task.fixed, task.fixed, task.fixed, choice, tied, attained, "graph search", 0, 0.0, task)
     node, core, whole = _systems(task)
+    quick = _windowed(task, core, whole, progress) if method is None and finest == 0 else None
+    if quick is not None:
+        return quick
     found = None
-    if isinstance(method, PolicyIteration):
-        found = iterate_policies(core, goal.maximise, method, progress)
+    if not isinstance(method, Sweeps):
+        found = iterate_policies(core, goal.maximise, method or PolicyIteration(), progress)
     if found is None:
         sweeps = method if isinstance(method, Sweeps) else Sweeps()
         return _swept(task, (core, whole), node, sweeps, progress)
-    choice, attained, solves = _attaining(task, core, node, found)
+    if found.endless is not None:
+        return _optimum(_without(task, node, found.endless), method, progress, finest)
+    choice, tied, attained, solves = _attaining(task, core, node, found, finest)
     if progress is not None:
         progress("proving the bounds")
-    tight = Tight(Parts(found.solved.high, found.solved.low), found.rows, found.solved.inverse)
-    proved = optimum_bound(core, whole, node[task.open], tight, goal.maximise)
+    tight = Tight(Parts(found.solved.high, found.solved.low), found.rows, found.solved.inverse, found.solved.scale)
+    proved = None if loops_in_doubt(task) else optimum_bound(core, whole, node[task.open], tight, goal.maximise)
+    if proved is None and goal.kind is Kind.REWARD:
+        level = levelled(task, tied)
+        if level is not None:
+            return _on_level(task, level, method, progress, finest)
     values, lower, upper = _joined(task, found.values[node[task.open]], proved, attained)
+    if proved is None and goal.kind is Kind.REWARD:
+        apart = without_cancelling(task, tied)
+        if apart is not None:  # what cannot come there may be proved all the same
+            upper = np.where(apart.open, _optimum(apart, method, progress, finest).upper, upper)
+            values = np.clip(values, lower, upper)
     residual = _residual(core, goal.maximise, found.solved.high, found.solved.low)
-    return Optimum(values, lower, upper, choice, attained, found.engine, found.rounds + solves, residual)
+    tied = fixed_best(task) | tied & task.open[goal.index.choice_to_state]
+    return Optimum(values, lower, upper, choice, tied, attained, found.engine, found.rounds + solves, residual, task)
+
+
+def _windowed(task: Task, core: System, whole: System, progress: Progress | None) -> Optimum | None:
+    """Return the optimum by windowed sweeps, None where these do not suit."""
+    from ratherthan.solve.windowed import suits_windows, windowed_optimum
+
+    return windowed_optimum(task, core, progress=progress) if suits_windows(task, core, whole) else None
+
+
+def _without(task: Task, node: Nodes, endless: Bools) -> Task:
+    """Return the task when it is known at which nodes more and more can be gathered."""
+    states = task.goal.index.states
+    rising = np.zeros(states, dtype=np.bool_)
+    rising[task.open] = endless[node[task.open]]
+    return most_reward(task.goal, rising | (task.fixed == np.inf))
+
+
+def _on_level(
+    task: Task, level: tuple[Goal, Floats], method: Method | None, progress: Progress | None, finest: int
+) -> Optimum:
+    """Return the optimum of a task by that of the task in which gains and losses that cancel are taken out."""
+    goal, height = level
+    best = _optimum(most_reward(goal, task.fixed == np.inf), method, progress, finest)
+    attained = evaluated(task.goal, chain_of(task.goal, Policy(choice=best.choice)))
+    lower, upper = raised(best.lower, height, -np.inf), raised(best.upper, height, np.inf)
+    lower = np.where(task.open, np.maximum(lower, attained.lower), lower)
+    values = np.clip(raised(best.values, height, 0.0), lower, upper)
+    return best._replace(values=values, lower=lower, upper=upper, attained=attained)
 
 
 def _residual(core: System, maximise: bool, *parts: Floats) -> float:
@@ -94,31 +145,37 @@ def _swept(
     goal, (core, whole), own = task.goal, systems, node[task.open]
     if progress is not None:
         progress(f"value iteration on {core.nodes} states")
-    swept = sweep_from_below(core, goal.maximise, method)
+    if goal.signed:
+        between, _, proved = swept_between(core, method, maximise=True)
+        proved = proved[own] if proved is not None and never_rises(whole, proved[own]) else None
+        swept = Swept(values=between, sweeps=method.most)
+    else:
+        swept = sweep_from_below(core, goal.maximise, method)
     rows = arriving_rows(core, goal.maximise, swept.values)
-    choice = first_tied(task, tied_choices(task, core, np.zeros(core.rows), np.full(core.rows, -1.0), rows))
+    tied = tied_choices(task, core, np.zeros(core.rows), np.full(core.rows, -1.0), rows)
+    choice = first_tied(task, tied)
     attained = evaluated(goal, chain_of(goal, Policy(choice=choice)))
-    if goal.maximise:
+    if goal.signed:
+        proved = None if loops_in_doubt(task) else proved
+    elif goal.maximise:
         above = upper_vector(core, swept.values, maximise=True, settings=None if goal.counts_cost else method)
         proved = above[own] if above is not None and never_rises(whole, above[own]) else None
     else:
         proved = swept.values[own] if never_falls(whole, swept.values[own]) else None
     values, lower, upper = _joined(task, swept.values[own], proved, attained)
     residual = _residual(core, goal.maximise, swept.values)
-    return Optimum(values, lower, upper, choice, attained, "value iteration", swept.sweeps, residual)
+    tied = fixed_best(task) | tied & task.open[goal.index.choice_to_state]
+    return Optimum(values, lower, upper, choice, tied, attained, "value iteration", swept.sweeps, residual, task)
 
 
 def _systems(task: Task) -> tuple[Nodes, System, System]:
     """Return the node of each state, the system with end components collapsed, and that of the open states as they are."""
     goal = task.goal
-    probability = goal.mdp.branch_to_probability
     single = nodes_of(task.open, task.fixed)
-    rows = np.flatnonzero(task.allowed)
     collapsed = task.open & (task.component >= 0)
+    whole = _system(goal, np.flatnonzero(task.allowed), single)
     if not collapsed.any():
-        core = build_system(goal.index, probability, goal.cost, rows, single)
-        return single, core, core
-    whole = build_system(goal.index, probability, goal.cost, rows, single)
+        return single, whole, whole
     representative = np.arange(len(single))
     members = np.flatnonzero(collapsed)
     first = np.full(int(task.component.max()) + 1, len(single))
@@ -130,11 +187,26 @@ def _systems(task: Task) -> tuple[Nodes, System, System]:
     node[kept] = np.arange(count)
     node[members] = node[representative[members]]
     external = np.flatnonzero(task.allowed & ~task.internal)
-    return node, build_system(goal.index, probability, goal.cost, external, node), whole
+    return node, _system(goal, external, node), whole
 
 
-def _attaining(task: Task, core: System, node: Nodes, found: Found) -> tuple[Nodes, Evaluated, int]:
-    """Return the first listed policy that loses nothing, its values, and how many were tried.
+def _system(goal: Goal, rows: Nodes, node: Nodes) -> System:
+    """Return the system of some choices of a goal."""
+    return build_system(
+        goal.index,
+        goal.probability,
+        goal.cost,
+        rows,
+        node,
+        size=goal.size,
+        exact=goal.exact,
+        signed=goal.signed,
+        discount=goal.discount,
+    )
+
+
+def _attaining(task: Task, core: System, node: Nodes, found: Found, finest: int) -> tuple[Nodes, Bools, Evaluated, int]:
+    """Return the first listed policy that loses nothing, the choices it was taken of, its values, and how many were tried.
 
     Where a policy loses, or cannot be proved not to, the next finer tolerance is taken, and only there. If even the solver's
     rows cannot be proved, because the run takes too long to get through a collapsed component, the solver's values are checked.
@@ -143,14 +215,14 @@ def _attaining(task: Task, core: System, node: Nodes, found: Found) -> tuple[Nod
     total, error = drift(core, found.solved.high, found.solved.low)
     gap = -total if goal.maximise else total
     wanted, own = found.values[node[open_]], node[open_]
-    rung = np.zeros(core.nodes, dtype=np.int64)
+    rung = np.full(core.nodes, finest, dtype=np.int64)
     guess = None
-    for solves in range(1, len(TIES) + 2):
-        least = TIES[rung][core.row_node] * found.values[core.row_node] + 4.0 * error
-        choice = first_tied(task, tied_choices(task, core, gap, least, found.rows))
+    for solves in range(finest + 1, len(TIES) + 2):
+        least = TIES[rung][core.row_node] * np.abs(found.values)[core.row_node] + 4.0 * error
+        tied = tied_choices(task, core, gap, least, found.rows)
+        choice = first_tied(task, tied)
         attained = evaluated(goal, chain_of(goal, Policy(choice=choice)), guess)
-        bound = attained.lower if goal.maximise else attained.upper
-        loses = np.abs(bound[open_] - wanted) > LOSS * wanted
+        loses = _losing(goal, attained, open_, wanted)
         if not loses.any() or guess is not None:
             break
         if solves < len(TIES):
@@ -158,12 +230,23 @@ def _attaining(task: Task, core: System, node: Nodes, found: Found) -> tuple[Nod
         else:
             rung[:] = len(TIES) - 1
             guess = _guess(task, core, node, found)
-    return choice, attained, solves
+    return choice, tied, attained, solves - finest
+
+
+def _losing(goal: Goal, attained: Evaluated, open_: Bools, wanted: Floats) -> Bools:
+    """Return where a policy does not provably attain what is wanted of the open states, up to a small loss.
+
+    Signed values may be small though what they are made of is not: the width of the policy's bounds is allowed them besides.
+    """
+    lower, upper = attained.lower[open_], attained.upper[open_]
+    most = LOSS * np.abs(wanted) + (np.where(np.isfinite(upper - lower), upper - lower, 0.0) if goal.signed else 0.0)
+    return ~(np.abs((lower if goal.maximise else upper) - wanted) <= most)
 
 
 def _guess(task: Task, core: System, node: Nodes, found: Found) -> Guess | None:
     """Return the solver's values on all states, with the margin that is right for its rows."""
-    tight = Tight(Parts(found.solved.high, found.solved.low), np.arange(core.nodes), found.solved.inverse)
+    parts = Parts(found.solved.high, found.solved.low)
+    tight = Tight(parts, np.arange(core.nodes), found.solved.inverse, found.solved.scale)
     margin = chain_margin(rows_of(core, found.rows), tight)
     if margin is None:
         return None
@@ -181,7 +264,7 @@ def _joined(
     values, lower, upper = task.fixed.copy(), task.fixed.copy(), task.fixed.copy()
     if task.goal.maximise:
         most = np.inf if task.goal.counts_cost else 1.0
-        lower[open_] = np.maximum(attained.lower[open_], 0.0)
+        lower[open_] = attained.lower[open_] if task.goal.signed else np.maximum(attained.lower[open_], 0.0)
         upper[open_] = most if proved is None else np.minimum(proved, most)
     else:
         lower[open_] = 0.0 if proved is None else proved

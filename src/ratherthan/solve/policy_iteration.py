@@ -12,13 +12,14 @@ values that can only be improved upon, so that every greedy policy on the way ar
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from ratherthan.model import graph
 from ratherthan.model.mdp import Bools, Floats
+from ratherthan.solve.endless import rising_nodes, stuck_nodes
 from ratherthan.solve.linear import GRAIN, MOST_DENSE, Solved, methods_for, solve_chain
 from ratherthan.solve.system import System, drift, exchanged, padded, rows_of
 
@@ -60,7 +61,8 @@ class PolicyIteration:
 class Found:
     """What a solver found on a system: approximate values in two parts, and the rows that attain them.
 
-    Nothing is promised; `certify` decides what is proved.
+    Nothing is promised; `certify` decides what is proved. Except `endless`: the nodes of end components where more and more
+    can be gathered, which is proved; then the values are none.
     """
 
     solved: Solved
@@ -68,6 +70,7 @@ class Found:
     rounds: int
     converged: bool
     engine: str
+    endless: Bools | None = None  # [n]
 
     @property
     def values(self) -> Floats:
@@ -83,7 +86,7 @@ def iterate_policies(
     Parameters
     ----------
     system : System
-        Of which every policy arrives at a sink, or (minimising) pays without end.
+        Of which every policy arrives at a sink, or (minimising) pays without end; where costs are signed, any.
     maximise : bool
     settings : PolicyIteration
     progress : callable, optional
@@ -94,9 +97,15 @@ def iterate_policies(
     methods = methods_for(rows_of(system, rows))
     found: Found | None = None
     floors = iter(FLOORS)
-    floor, vain = next(floors), 0
+    floor, vain, sweeps = next(floors), 0, settings.sweeps
     for number in range(1, settings.most_rounds + 1):
-        solved = solve_chain(rows_of(system, rows), methods)
+        stuck = stuck_nodes(system, rows) if system.signed else None
+        if stuck is not None and found is not None:
+            rising = rising_nodes(system, rows, stuck) if maximise else None
+            if rising is not None:
+                return replace(found, endless=rising)
+            sweeps = 0
+        solved = solve_chain(rows_of(system, rows), methods) if stuck is None else None
         if found is None:
             if solved is None:
                 return None
@@ -116,21 +125,21 @@ def iterate_policies(
             return found
         if progress is not None:
             progress(f"policy iteration, round {number}: {changed} of {system.nodes} choices improved")
-        sweeping = system.nodes > MOST_DENSE and changed > FEW * system.nodes
-        rows = _swept(system, sign, solved.high, better, settings.sweeps) if sweeping else better
+        sweeping = sweeps > 0 and system.nodes > MOST_DENSE and changed > FEW * system.nodes
+        rows = _swept(system, sign, solved.high, better, sweeps) if sweeping else better
     return found
 
 
 def _worse(sign: float, solved: Solved, found: Found) -> bool:
     """Return whether a round lost something that rounding does not explain."""
     before = found.solved.high
-    return bool((sign * (solved.high - before) > LOSS * np.abs(before)).any())
+    return bool((sign * (solved.high - before) > LOSS * np.abs(found.solved.size)).any())
 
 
 def _improved(solved: Solved, found: Found) -> bool:
     """Return whether a round changed a value by more than rounding."""
     before = found.solved.high
-    return bool((np.abs(solved.high - before) > GAIN * np.abs(before)).any())
+    return bool((np.abs(solved.high - before) > GAIN * np.abs(found.solved.size)).any())
 
 
 def _improved_rows(system: System, sign: float, solved: Solved, rows: Nodes, floor: float) -> tuple[Nodes, int]:
@@ -140,11 +149,11 @@ def _improved_rows(system: System, sign: float, solved: Solved, rows: Nodes, flo
     the chain, and differ between parts, as their estimate does.
     """
     total, error = drift(system, solved.high, solved.low)
-    error += GRAIN * exchanged(system, solved.high)
+    error += GRAIN * exchanged(system, np.abs(solved.high))
     doubt = np.abs(solved.inverse((np.abs(total) + error)[rows]))
     if np.isfinite(doubt).all():
         error += drift(system, doubt, cost=np.zeros(system.rows), one=0.0)[1] / system.rounding
-    error = CAUTION * error + floor * np.abs(solved.high)[system.row_node]
+    error = CAUTION * error + floor * np.abs(solved.size)[system.row_node]
     better = best_rows(system, sign * total, error, rows)
     return better, int(np.count_nonzero(better != rows))
 
@@ -205,7 +214,7 @@ def _swept(system: System, sign: float, values: Floats, rows: Nodes, sweeps: int
     extended = sign * padded(values, 1.0)
     for _ in range(sweeps):
         extended[:n] = np.minimum.reduceat(paid + step @ extended, system.node_to_rows[:-1])
-    swept = np.abs(extended[:n])
+    swept = sign * extended[:n]
     total, error = drift(system, swept)
-    error += 2.0**-48 * exchanged(system, swept)  # of values in one double
+    error += 2.0**-48 * exchanged(system, np.abs(swept))  # of values in one double
     return best_rows(system, sign * total / leave, CAUTION * error / leave, rows)

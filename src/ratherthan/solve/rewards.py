@@ -1,20 +1,47 @@
 """A model and the name of a reward enter, the expected immediate reward r̄ of each choice leaves.
 
-r̄(s, a) = state(s) + choice(s, a) + Σ δ(s, a, s') · branch(s, a, s'). No name counts steps: r̄ = 1.
+r̄(s, a) = state(s) + choice(s, a) + Σ δ(s, a, s') · branch(s, a, s'). No name counts steps: r̄ = 1. A name may be a weighted
+sum of rewards.
+
+Where parts have different signs they may cancel, and the rounding error of r̄ is not small in relation to r̄, but to the sum of
+the absolute values: the *size* of r̄. Whether a choice pays at all is told by its parts, not by the rounded sum.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ratherthan.errors import PropertyError
 from ratherthan.model.index import Index
-from ratherthan.model.mdp import MDP, Bools, Floats
+from ratherthan.model.mdp import MDP, Bools, Floats, Reward
+from ratherthan.model.weights import reward_of, weights_of
+from ratherthan.solve.system import two_sum
 
-__all__ = ["costs_of", "expected_reward"]
+__all__ = ["Paid", "costs_of", "expected_reward", "paid_of"]
 
 SMALLEST = 5e-324
 """The least positive double: a reward that is positive stays so, however small its probability."""
+
+
+FEW_PARTS = 8
+"""How many rewards a weighted sum may have within the rounding error that `system` allows for."""
+
+
+class Paid(NamedTuple):
+    """What each choice pays, ``[C]`` each."""
+
+    total: Floats
+    """r̄; 0 exactly where all parts are 0."""
+    size: Floats
+    """The sum of the absolute values of its parts, which its rounding error is in proportion to."""
+    pays: Bools
+    """Where it is not exactly 0, as far as can be told."""
+    signs: tuple[Bools, Bools]
+    """Where a part is above, and where one is below 0."""
+    exact: Bools
+    """Where r̄ was computed without rounding."""
 
 
 def expected_reward(mdp: MDP, name: str | None) -> Floats:
@@ -38,20 +65,19 @@ def expected_reward(mdp: MDP, name: str | None) -> Floats:
     """
     if name is None:
         return np.ones(mdp.choices)
-    if name not in mdp.rewards:
+    reward = reward_of(mdp, name)
+    if reward is None:
         there = ", ".join(f"'{known}'" for known in mdp.rewards) or "none"
         raise PropertyError(
             f"The objective must name a reward of the model, got '{name}'; there are: {there}.", reward=name
         )
-    reward = mdp.rewards[name]
-    total = np.zeros(mdp.choices)
-    with np.errstate(over="ignore", invalid="ignore"):
-        if reward.state is not None:
-            total += np.repeat(reward.state, np.diff(mdp.state_to_choices))
-        if reward.choice is not None:
-            total += reward.choice
-        if reward.branch is not None:
-            total += np.add.reduceat(reward.branch * mdp.branch_to_probability, mdp.choice_to_branches[:-1])
+    total = _total(mdp, reward)
+    _refuse_infinite(mdp, name, total)
+    return total
+
+
+def _refuse_infinite(mdp: MDP, name: str, total: Floats) -> None:
+    """Raise PropertyError where sums are beyond doubles."""
     if not np.isfinite(total).all():
         choice = int(np.argmin(np.isfinite(total)))
         raise PropertyError(
@@ -60,7 +86,88 @@ def expected_reward(mdp: MDP, name: str | None) -> Floats:
             reward=name,
             choice=choice,
         )
+
+
+def _total(mdp: MDP, reward: Reward, *, absolute: bool = False) -> Floats:
+    """Return Σ of the parts per choice, or of their absolute values."""
+    total = np.zeros(mdp.choices)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for part, values in reward.parts():
+            given = np.abs(values) if absolute else values
+            if part == "state":
+                total += np.repeat(given, np.diff(mdp.state_to_choices))
+            elif part == "choice":
+                total += given
+            else:
+                total += np.add.reduceat(given * mdp.branch_to_probability, mdp.choice_to_branches[:-1])
     return total
+
+
+def paid_of(mdp: MDP, index: Index, name: str | None) -> Paid:
+    """Return what each choice pays, with all that is known of its sign and its rounding error.
+
+    Parameters
+    ----------
+    mdp : MDP
+    index : Index
+    name : str, optional
+        As for `expected_reward`.
+
+    Returns
+    -------
+    Paid
+
+    Raises
+    ------
+    PropertyError
+        If there is no such reward, or it exceeds the range of doubles.
+    """
+    total = expected_reward(mdp, name)
+    every, none = np.ones(mdp.choices, dtype=np.bool_), np.zeros(mdp.choices, dtype=np.bool_)
+    weights = None if name is None else weights_of(name, mdp.rewards)
+    if weights is None:
+        return Paid(total, total, every, (every, none), every)
+    size, above, below = np.zeros(mdp.choices), none.copy(), none.copy()
+    with np.errstate(over="ignore"):
+        for known, weight in weights.items():
+            size += weight * _total(mdp, mdp.rewards[known], absolute=True)
+            for part, values in mdp.rewards[known].parts():
+                above |= _choices_with(index, part, values > 0)
+                below |= _choices_with(index, part, values < 0)
+        size *= max(1.0, len(weights) / FEW_PARTS)
+    _refuse_infinite(mdp, name or "", size)
+    exact = ~(above | below)
+    if list(weights.values()) == [1.0]:
+        exact |= _exact(mdp, index, mdp.rewards[next(iter(weights))])
+    nothing = exact & (total == 0.0)
+    above, below = above & ~nothing, below & ~nothing
+    return Paid(np.where(nothing, 0.0, total), np.where(nothing, 0.0, size), above | below, (above, below), exact)
+
+
+def _exact(mdp: MDP, index: Index, reward: Reward) -> Bools:
+    """Return ``[C]``: where the parts of a reward add up without rounding, one certain branch at most being paid for."""
+    single = (np.diff(mdp.choice_to_branches) == 1) & (mdp.branch_to_probability[mdp.choice_to_branches[:-1]] == 1.0)
+    total, exact = np.zeros(mdp.choices), np.ones(mdp.choices, dtype=np.bool_)
+    for part, values in reward.parts():
+        if part == "branch":
+            exact &= single | ~_choices_with(index, part, values != 0.0)
+            given = np.where(single, values[mdp.choice_to_branches[:-1]], 0.0)
+        else:
+            given = values[index.choice_to_state] if part == "state" else values
+        total, lost = two_sum(total, given)
+        exact &= lost == 0.0
+    return exact
+
+
+def _choices_with(index: Index, part: str, marked: Bools) -> Bools:
+    """Return ``[C]``: the choices that have a marked state, choice or branch."""
+    if part == "state":
+        return marked[index.choice_to_state]
+    if part == "choice":
+        return marked
+    found = np.zeros(index.choices, dtype=np.bool_)
+    found[index.branch_to_choice[marked]] = True
+    return found
 
 
 def costs_of(mdp: MDP, index: Index, name: str | None) -> tuple[Floats, Bools]:
@@ -82,25 +189,15 @@ def costs_of(mdp: MDP, index: Index, name: str | None) -> tuple[Floats, Bools]:
     Raises
     ------
     PropertyError
-        If there is no such reward, or it is negative somewhere.
+        If there is no such reward, or it (or a part of a weighted sum) is negative somewhere.
     """
-    total = expected_reward(mdp, name)
-    if name is None:
-        return total, np.ones(mdp.choices, dtype=np.bool_)
-    reward = mdp.rewards[name]
-    costly = np.zeros(mdp.choices, dtype=np.bool_)
-    for part, values in reward.parts():
-        negative = np.flatnonzero(values < 0)
-        if len(negative):
-            _refuse(mdp, index, name, (part, int(negative[0]), float(values[negative[0]])))
-        positive = values > 0
-        if part == "state":
-            costly |= positive[index.choice_to_state]
-        elif part == "choice":
-            costly |= positive
-        else:
-            costly[index.branch_to_choice[positive]] = True
-    return np.where(costly, np.maximum(total, SMALLEST), 0.0), costly
+    for known in (weights_of(name, mdp.rewards) or {}) if name is not None else {}:
+        for part, values in mdp.rewards[known].parts():
+            negative = np.flatnonzero(values < 0)
+            if len(negative):
+                _refuse(mdp, index, known, (part, int(negative[0]), float(values[negative[0]])))
+    paid = paid_of(mdp, index, name)
+    return np.where(paid.pays, np.maximum(paid.total, SMALLEST), 0.0), paid.pays
 
 
 def _refuse(mdp: MDP, index: Index, name: str, fault: tuple[str, int, float]) -> None:
@@ -124,6 +221,6 @@ def _refuse(mdp: MDP, index: Index, name: str, fault: tuple[str, int, float]) ->
         place["target"] = target
     raise PropertyError(
         f"A reward that is added up until a goal must not be negative, got {value:g} for '{name}' at {called}. "
-        "Use a reward without negative parts.",
+        f"Use a reward without negative parts, or ask for plans that are sure to arrive: [Fsure goal].",
         **place,
     )

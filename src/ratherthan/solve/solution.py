@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from ratherthan.model.mdp import Bools, Floats
-from ratherthan.model.objective import Objective
+from ratherthan.model.objective import Level
 from ratherthan.model.policy import Policy
 from ratherthan.model.problem import Problem
 
@@ -32,18 +32,20 @@ class Solution:
     Parameters
     ----------
     problem : Problem
-    objectives : tuple of Objective, ``[K]``
+    objectives : tuple of objectives, ``[K]``
+        The levels, first things first; one where the objective is not lexicographic.
     values, lower, upper : array of float, ``[K, S]``
         The optimum ρ of each objective, and bounds with lower ≤ ρ ≤ upper; ±∞ is a value like any other. Where nothing is
         proved the bounds are -∞ and ∞ (never NaN), which decides no comparison.
     policy : Policy
-        The optimal policy, or the one that was given.
+        The optimal policy, or the one that was given. Of several levels it attains the first ones first; what it attains of
+        each stands in `policy_values`.
     given : bool
         Whether the policy was given, rather than computed.
     policy_values, policy_lower, policy_upper : array of float, ``[K, S]``
         The value ρ^π of following the policy, likewise.
     goal, hazard : array of bool, ``[S]``
-        Where the objective ends well, and badly. For a minimised probability the target is the hazard and goal is empty.
+        Where the objective (of several, the first) ends well, and badly. For a minimised probability the target is the hazard and goal is empty.
     can_arrive : array of bool, ``[S]``
         Whether the largest probability to reach the goal (through states that are no hazard) is above 0; all true where
         the objective has no goal.
@@ -57,7 +59,7 @@ class Solution:
     """
 
     problem: Problem
-    objectives: tuple[Objective, ...]
+    objectives: tuple[Level, ...]
     values: Floats  # [K, S]
     lower: Floats  # [K, S]
     upper: Floats  # [K, S]

@@ -1,8 +1,10 @@
 """A Problem enters, a Solution leaves: the optimum with its policy (`solve`), or a given policy against it (`evaluate`).
 
-The straight line: the graph decides what it can (`task`); the rest becomes a system with end components collapsed (`system`);
-policy iteration solves it (`policy_iteration`); of the choices that cannot be told from the best the policy takes the first
-listed with which it arrives (`tied`), and is evaluated (`chain`); the bounds are proved (`certify`).
+The straight line: what is wanted is resolved on the model (`goal`), for a mission on the product with what must be remembered;
+the graph decides what it can (`task`); the rest becomes a system with end components collapsed (`system`); policy iteration
+solves it (`policy_iteration`); of the choices that cannot be told from the best the policy takes the first listed with which it
+arrives (`tied`), and is evaluated (`chain`); the bounds are proved (`certify`). Several objectives in order go this way one
+after the other, each on the choices that the ones before leave (`lexicographic`).
 """
 
 from __future__ import annotations
@@ -12,18 +14,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from ratherthan.model.index import index_of
+from ratherthan.errors import PropertyError
 from ratherthan.model.mdp import MDP, Bools, Floats
-from ratherthan.model.objective import Objective
+from ratherthan.model.objective import Level, Mission, Objective, levels_of
 from ratherthan.model.policy import Policy, check_policy
 from ratherthan.model.problem import Problem
-from ratherthan.solve.chain import chain_of, evaluated, refuse_unsaid
-from ratherthan.solve.optimum import Method, optimum
-from ratherthan.solve.policy_iteration import PolicyIteration
+from ratherthan.solve.chain import Chain, Evaluated, chain_of, evaluated, refuse_unsaid
+from ratherthan.solve.goal import Goal, goal_of, objective_of, reaching
+from ratherthan.solve.lexicographic import ordered, over_after
+from ratherthan.solve.optimum import Method, Optimum
 from ratherthan.solve.solution import Outcome, Solution
-from ratherthan.solve.task import Goal, goal_of, objective_of, task_of
 
-__all__ = ["arrival", "evaluate", "solve"]
+__all__ = ["arrival", "evaluate", "solve", "unfolded_for"]
 
 Progress = Callable[[str], None]
 
@@ -48,7 +50,7 @@ def solve(
     precision : float
         The relative width of bounds that is wanted; where it is not reached, the outcome says so.
     method : PolicyIteration or Sweeps, optional
-        The solver and its settings; policy iteration by default.
+        The solver and its settings. By default the program chooses.
     progress : callable, optional
         Called with a short text now and then.
 
@@ -56,7 +58,8 @@ def solve(
     -------
     Solution
         Among the optimal policies the one that takes, in every state, the first listed of the best choices with which it
-        still attains the optimum.
+        still attains the optimum. For a mission, its `problem` is the product; a lexicographic objective has a row of values
+        per level.
 
     Raises
     ------
@@ -64,29 +67,35 @@ def solve(
         If there is no objective, or it does not fit the model (an unknown reward, a negative one …).
     """
     wanted = objective_of(problem, objective)
-    goal = goal_of(problem, wanted)
-    task = task_of(goal)
-    best = optimum(task, method or PolicyIteration(), progress)
-    good, bad = goal.ends
-    attained = best.attained
+    problem, levels = unfolded_for(problem, wanted), levels_of(wanted)
+    found = ordered(problem, levels, method, progress)
+    good, bad = found.goals[0].ends
+    bounds = [
+        _facing(goal, best.values, best.lower, best.upper) for goal, best in zip(found.goals, found.best, strict=True)
+    ]
+    attained = [
+        _facing(goal, got.values, got.lower, got.upper) for goal, got in zip(found.goals, found.attained, strict=True)
+    ]
+    values, lower, upper = map(np.stack, zip(*bounds, strict=True))
+    policy_values, policy_lower, policy_upper = map(np.stack, zip(*attained, strict=True))
     return Solution(
         problem=problem,
-        objectives=(wanted,),
-        values=best.values[None],
-        lower=best.lower[None],
-        upper=best.upper[None],
-        policy=Policy(choice=best.choice),
+        objectives=levels,
+        values=values,
+        lower=lower,
+        upper=upper,
+        policy=Policy(choice=found.choice),
         given=False,
-        policy_values=attained.values[None],
-        policy_lower=attained.lower[None],
-        policy_upper=attained.upper[None],
+        policy_values=policy_values,
+        policy_lower=policy_lower,
+        policy_upper=policy_upper,
         goal=good,
         hazard=bad,
-        can_arrive=task.can_arrive,
-        outcome=_outcome(best.lower, best.upper, precision),
-        engine=best.engine,
-        sweeps=best.solves,
-        residual=best.residual,
+        can_arrive=found.best[0].task.can_arrive,
+        outcome=_worst([_outcome(goal, best, precision) for goal, best in zip(found.goals, found.best, strict=True)]),
+        engine=", ".join(dict.fromkeys(best.engine for best in found.best)),
+        sweeps=sum(best.solves for best in found.best),
+        residual=max(best.residual for best in found.best),
     )
 
 
@@ -122,25 +131,78 @@ def evaluate(
     PropertyError
         As for `solve`.
     """
-    check_policy(problem.mdp, policy)
     wanted = objective_of(problem, objective)
-    goal = goal_of(problem, wanted)
-    chain = chain_of(goal, policy)
-    refuse_unsaid(goal, chain)
-    best = solve(problem, wanted, precision=precision, method=method, progress=progress)
-    followed = evaluated(goal, chain)
-    decided = followed.lower > -np.inf
-    outcome = _outcome(followed.lower[decided], followed.upper[decided], precision)
+    product = unfolded_for(problem, wanted)
+    if len(policy.choice) != product.mdp.states or product is problem:
+        check_policy(problem.mdp, policy)
+    levels, policy = levels_of(wanted), _lifted(policy, product)
+    check_policy(product.mdp, policy)
+    refuse_unsaid(*_chain(product, levels[0], policy))
+    best = solve(product, wanted, precision=precision, method=method, progress=progress)
+    over, found = None, []
+    for level in levels:
+        goal, chain = _chain(product, level, policy, over)
+        found.append((goal, evaluated(goal, chain)))
+        over = over_after(levels[0], goal, best.can_arrive) if over is None else over
+    values, lower, upper = map(
+        np.stack, zip(*(_facing(goal, got.values, got.lower, got.upper) for goal, got in found), strict=True)
+    )
+    outcome = _worst([_outcome(goal, got, precision) for goal, got in found])
     return replace(
         best,
         policy=policy,
         given=True,
-        policy_values=followed.values[None],
-        policy_lower=followed.lower[None],
-        policy_upper=followed.upper[None],
+        policy_values=values,
+        policy_lower=lower,
+        policy_upper=upper,
         outcome=best.outcome if outcome is Outcome.CERTIFIED else outcome,
-        sweeps=best.sweeps + followed.solves,
+        sweeps=best.sweeps + sum(got.solves for _, got in found),
     )
+
+
+def unfolded_for(problem: Problem, objective: Objective) -> Problem:
+    """Return the problem on which an objective is solved: for a mission the product with what must be remembered.
+
+    Parameters
+    ----------
+    problem : Problem
+        If it is that product already, it is returned.
+    objective : Objective
+
+    Raises
+    ------
+    PropertyError
+        If a mission is not the first of several objectives: the run on its product ends with it.
+    """
+    first, *others = levels_of(objective)
+    for number, level in enumerate(others, 2):
+        if isinstance(level, Mission):
+            raise PropertyError(
+                f"Of several properties only the first may be one that needs memory, got '{level.text}' as number {number}. "
+                "Put it first.",
+                text=level.text,
+            )
+    if not isinstance(first, Mission):
+        return problem
+    from ratherthan.model.product import unfolded
+
+    product = unfolded(problem, first)
+    return product if objective is first else replace(product, objective=objective)
+
+
+def _lifted(policy: Policy, product: Problem) -> Policy:
+    """Return a policy of the model as one on the product; one that is on the product as it is."""
+    if len(policy.choice) == product.mdp.states:
+        return policy
+    from ratherthan.model.product import lifted
+
+    return lifted(policy, product)
+
+
+def _chain(problem: Problem, level: Level, policy: Policy, over: Bools | None = None) -> tuple[Goal, Chain]:
+    """Return what a level wants, and the model under a policy."""
+    goal = goal_of(problem, level, over)
+    return goal, chain_of(goal, policy)
 
 
 def arrival(source: Problem | MDP, policy: Policy, goal: Bools, hazard: Bools) -> tuple[Floats, Floats]:
@@ -159,30 +221,48 @@ def arrival(source: Problem | MDP, policy: Policy, goal: Bools, hazard: Bools) -
     """
     mdp = source.mdp if isinstance(source, Problem) else source
     check_policy(mdp, policy)
-    wanted = Goal(
-        mdp=mdp,
-        index=index_of(mdp),
-        maximise=True,
-        counts_cost=False,
-        target=goal,
-        through=~hazard | goal,
-        cost=np.zeros(mdp.choices),
-        costly=np.zeros(mdp.choices, dtype=np.bool_),
-    )
+    wanted = reaching(mdp, goal, ~hazard | goal)
     found = evaluated(wanted, chain_of(wanted, policy))
     return found.lower, found.upper
 
 
-def _outcome(lower: Floats, upper: Floats, precision: float) -> Outcome:
-    """Return how far values are proved: to `precision` everywhere, on one side, in part, or not at all."""
+def _facing(goal: Goal, values: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return values and bounds as the objective means them, which a mirrored goal turns round."""
+    return (0.0 - values, 0.0 - upper, 0.0 - lower) if goal.mirrored else (values, lower, upper)
+
+
+def _outcome(goal: Goal, found: Optimum | Evaluated, precision: float) -> Outcome:
+    """Return how far values are proved: to `precision` everywhere, on one side, in part, or not at all.
+
+    Values that may have either sign are small by chance: their bounds are seen in relation to the largest of them, and to what is
+    paid at once.
+    """
+    decided = np.ones(len(found.lower), dtype=np.bool_)
+    if isinstance(found, Evaluated):  # what a policy is silent about is no matter of proof
+        decided = ~found.lost
+    lower, upper = found.lower[decided], found.upper[decided]
     exact = lower == upper
+    finite = np.isfinite(lower) & np.isfinite(upper)
     with np.errstate(invalid="ignore"):
-        near = exact | (np.isfinite(upper) & (upper - lower <= precision * upper))
+        size = np.abs(upper)
+        if goal.signed:
+            size = np.full(
+                len(upper), max(np.abs(part).max(initial=0.0) for part in (lower[finite], upper[finite], goal.cost))
+            )
+        near = exact | (finite & (upper - lower <= precision * size))
     if near.all():
         return Outcome.CERTIFIED
     bounded_above = (upper < np.inf) | exact
-    if (bounded_above & (lower > 0.0) | exact).all():
+    bounded_below = (lower > (-np.inf if goal.signed else 0.0)) | exact
+    if (bounded_above & bounded_below).all():
         return Outcome.STOPPED
+    if goal.mirrored:
+        bounded_above, bounded_below = bounded_below, bounded_above
     if bounded_above.all():
         return Outcome.UPPER_ONLY
-    return Outcome.LOWER_ONLY if ((lower > 0.0) | exact).all() else Outcome.UNCERTIFIED
+    return Outcome.LOWER_ONLY if bounded_below.all() else Outcome.UNCERTIFIED
+
+
+def _worst(outcomes: list[Outcome]) -> Outcome:
+    """Return the first outcome that is not certified, else that all are."""
+    return next((outcome for outcome in outcomes if outcome is not Outcome.CERTIFIED), Outcome.CERTIFIED)

@@ -9,6 +9,9 @@ be a lower bound; from x ≥ T x it falls, likewise.
 * From above, for probabilities: x = 1, times 1 + γ. For costs there is no such vector to start with: (1 + η) x with x from
   below is tried for some η, which passes where costs are positive and x has converged.
 
+* With signed costs there is no such vector to start with. Value iteration runs from 0, and x ∓ ε is tried for some ε, the same at
+  every node, which passes where every row leads to a sink with some probability, as discounted rows do.
+
 It ends when no value changes by more than the precision, or after the sweeps that were allowed: slow chains need about as
 many as they need steps. The difference to the limit is then unknown, but the bounds hold.
 
@@ -27,11 +30,11 @@ import numpy.typing as npt
 
 from ratherthan.model import graph
 from ratherthan.model.mdp import Floats
-from ratherthan.solve.certify import never_rises
+from ratherthan.solve.certify import never_falls, never_rises
 from ratherthan.solve.policy_iteration import least_rows
 from ratherthan.solve.system import System, drift, padded
 
-__all__ = ["Sweeps", "Swept", "arriving_rows", "sweep_from_above", "sweep_from_below", "upper_vector"]
+__all__ = ["Sweeps", "Swept", "arriving_rows", "sweep_from_above", "sweep_from_below", "swept_between", "upper_vector"]
 
 Nodes = npt.NDArray[np.int64]
 Operator = Callable[[Floats], Floats]
@@ -94,6 +97,20 @@ def upper_vector(system: System, below: Floats, maximise: bool, settings: Sweeps
     return next((values for values in candidates if never_rises(system, values)), None)
 
 
+def swept_between(system: System, settings: Sweeps, *, maximise: bool) -> tuple[Floats, Floats | None, Floats | None]:
+    """Return values of a system with signed costs, and vectors below and above them that pass the checks, or None.
+
+    The vector below is one for every policy, of a system with several rows per node as well.
+    """
+    values = _iterated(system, maximise, settings, (0.0, lambda _, after: after)).values
+    if not np.isfinite(values).all():
+        return np.zeros(system.nodes), None, None
+    size = float(np.abs(values).max()) + float(system.magnitude.max())
+    below = next((low for low in (values - share * size for share in RAISES) if never_falls(system, low)), None)
+    above = next((high for high in (values + share * size for share in RAISES) if never_rises(system, high)), None)
+    return values, below, above
+
+
 def arriving_rows(system: System, maximise: bool, values: Floats) -> Nodes:
     """Return best rows of every node for given values; where they do not arrive, rows that lead to where they do, ``[n]``."""
     total, _ = drift(system, values)
@@ -122,7 +139,7 @@ def _iterated(
     settled, sweeps = False, 0
     while not settled and sweeps < settings.most:
         after = step(values, operator(values))
-        settled = bool((np.abs(after - values) <= settings.change * after).all())
+        settled = bool((np.abs(after - values) <= settings.change * np.abs(after)).all())
         values, sweeps = after, sweeps + 1
     return Swept(values=values, sweeps=sweeps)
 

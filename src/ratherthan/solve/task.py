@@ -1,4 +1,4 @@
-"""A model and an objective enter; a Task leaves: what the graph alone decides, and what is left to compute.
+"""A Goal enters; a Task leaves: what the graph alone decides, and what is left to compute.
 
 Which states have the value 0, 1 or ∞ exactly, and where the optimum has a unique fixed point, depends on the graph and
 on which costs are positive, never on a computed number. With G the goal:
@@ -15,6 +15,11 @@ on which costs are positive, never on a computed number. With G the goal:
 * *Least probability.* 0 where G can be avoided, 1 where it cannot be missed. In the rest no end component is left: where a
   run can stay for ever, G is avoided.
 
+* *Sums of rewards of either sign, and discounted sums*: see `gathering`.
+
+Objectives whose rewards are all of the sign against their direction are mirrored (`goal`): the most reward, where every
+reward is at most 0, is the least cost of the opposite rewards, to the letter.
+
 References
 ----------
 D. P. Bertsekas, J. N. Tsitsiklis, An Analysis of Stochastic Shortest Path Problems, Math. Oper. Res. 16(3), 1991.
@@ -23,149 +28,22 @@ S. Haddad, B. Monmege, Interval iteration algorithm for MDPs and IMDPs, Theor. C
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-import numpy.typing as npt
 
-from ratherthan.errors import PropertyError
 from ratherthan.model import graph
-from ratherthan.model.formula import states_where
-from ratherthan.model.index import Index, index_of
-from ratherthan.model.mdp import MDP, Bools, Floats
-from ratherthan.model.objective import ExpectedCost, Objective, ReachAvoid
-from ratherthan.model.problem import Problem
-from ratherthan.model.property import choose_objective
-from ratherthan.solve.rewards import costs_of
+from ratherthan.solve.gathering import discounted, most_reward
+from ratherthan.solve.goal import Goal, Kind, Task, goal_of, objective_of
 
 __all__ = ["Goal", "Task", "goal_of", "objective_of", "task_of"]
-
-Choices = npt.NDArray[np.int64]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Goal:
-    """What an objective wants, resolved on a model.
-
-    Parameters
-    ----------
-    mdp : MDP
-    index : Index
-    maximise : bool
-    counts_cost : bool
-        Whether the value is an expected cost, else it is a probability.
-    target, through : array of bool, ``[S]``
-        Where to, and through which states a run may pass before; a run ends at targets and where neither holds.
-    cost : array of float, ``[C]``
-        r̄ of each choice; 0 for probabilities.
-    costly : array of bool, ``[C]``
-        Where the cost is positive.
-    """
-
-    mdp: MDP
-    index: Index
-    maximise: bool
-    counts_cost: bool
-    target: Bools  # [S]
-    through: Bools  # [S]
-    cost: Floats  # [C]
-    costly: Bools  # [C]
-
-    @property
-    def running(self) -> Bools:
-        """Where the objective has not ended, ``[S]``."""
-        return self.through & ~self.target
-
-    @property
-    def ends(self) -> tuple[Bools, Bools]:
-        """Where it has ended well and badly, ``[S]`` each: the goal and the hazards of a Solution."""
-        outside = ~self.through & ~self.target
-        if self.counts_cost or self.maximise:
-            return self.target, outside
-        return outside, self.target
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Task:
-    """An optimum to compute, with all that the graph decides.
-
-    Parameters
-    ----------
-    goal : Goal
-    fixed : array of float, ``[S]``
-        The exact value where the graph decides it: 0, 1 or ∞; 0 where `open`.
-    open : array of bool, ``[S]``
-        Where the value is to be computed; it is finite and above 0 there.
-    allowed : array of bool, ``[C]``
-        The choices of open states among which the optimum is.
-    component : array of int, ``[S]``
-        The end component that a state is collapsed into, -1 for none.
-    internal : array of bool, ``[C]``
-        The choices that stay in such a component free of charge.
-    arriving : array of bool, ``[S]``
-        Where an optimal policy must not only take a best choice but also get on.
-    attaining : array of bool, ``[C]``
-        The best choices of the states that are arriving and not open.
-    elsewhere : array of int, ``[S]``
-        The policy's choice in the states that are neither arriving nor open.
-    can_arrive : array of bool, ``[S]``
-        As in Solution.
-    """
-
-    goal: Goal
-    fixed: Floats  # [S]
-    open: Bools  # [S]
-    allowed: Bools  # [C]
-    component: Choices  # [S]
-    internal: Bools  # [C]
-    arriving: Bools  # [S]
-    attaining: Bools  # [C]
-    elsewhere: Choices  # [S]
-    can_arrive: Bools  # [S]
-
-
-def objective_of(problem: Problem, objective: Objective | None) -> Objective:
-    """Return `objective`, or the one that the problem makes plain; PropertyError if there is neither."""
-    wanted = choose_objective(problem) if objective is None else objective
-    if not isinstance(wanted, ExpectedCost | ReachAvoid):
-        raise PropertyError(f"The objective must ask for a value, such as Pmax=? or Rmin=?, got '{wanted.text}'.")
-    return wanted
-
-
-def goal_of(problem: Problem, objective: Objective) -> Goal:
-    """Return what `objective` wants on the problem's model.
-
-    Raises
-    ------
-    PropertyError
-        For formulas that do not fit the model, an unknown reward and a negative one.
-    """
-    mdp, definitions = problem.mdp, problem.definitions
-    index = index_of(mdp)
-    target = states_where(mdp, objective.goal, definitions)
-    if isinstance(objective, ExpectedCost):
-        cost, costly = costs_of(mdp, index, objective.reward)
-        through = np.ones(mdp.states, dtype=np.bool_)
-    else:
-        cost, costly = np.zeros(mdp.choices), np.zeros(mdp.choices, dtype=np.bool_)
-        through = np.ones(mdp.states, dtype=np.bool_)
-        if objective.through is not None:
-            through = states_where(mdp, objective.through, definitions)
-    return Goal(
-        mdp=mdp,
-        index=index,
-        maximise=objective.maximise,
-        counts_cost=isinstance(objective, ExpectedCost),
-        target=target,
-        through=through,
-        cost=cost,
-        costly=costly,
-    )
 
 
 def task_of(goal: Goal) -> Task:
     """Return the task that a goal sets: what the graph decides, and what is left."""
-    if goal.counts_cost:
+    if goal.kind is Kind.DISCOUNTED:
+        return discounted(goal)
+    if goal.kind is Kind.REWARD:
+        return most_reward(goal)
+    if goal.kind is Kind.COST:
         return _most_cost(goal) if goal.maximise else _least_cost(goal)
     return _most_likely(goal) if goal.maximise else _least_likely(goal)
 

@@ -25,12 +25,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ratherthan.model import graph
-from ratherthan.model.index import Index, build_index
-from ratherthan.model.mdp import MDP, Bools, Floats
+from ratherthan.model.index import build_index
+from ratherthan.model.mdp import Bools, Floats
+from ratherthan.solve.goal import Goal, Kind, Task
 from ratherthan.solve.system import System
-from ratherthan.solve.task import Task
 
-__all__ = ["first_tied", "tied_choices"]
+__all__ = ["first_tied", "fixed_best", "tied_choices"]
 
 LIKELY = 0.5
 """A branch is likely if it is at least so many times as likely as the likeliest branch of its choice that moves."""
@@ -57,6 +57,25 @@ def tied_choices(task: Task, core: System, gap: Floats, least: Floats, rows: Nod
     return tied
 
 
+def fixed_best(task: Task) -> Bools:
+    """Return the best choices of the states whose value the graph decides, ``[C]``: those that have it as well.
+
+    A value of 0 or 1 is had by choices that pay nothing and lead to that value only. Where no policy is sure to arrive all
+    choices are the same; where there is no end to what can be gathered, those are best that may lead to such a state.
+    """
+    goal = task.goal
+    index = goal.index
+    same = task.fixed[index.branch_to_target] == task.fixed[index.choice_to_state[index.branch_to_choice]]
+    leads = ~graph.any_branch_in_rows(index, ~same | task.open[index.branch_to_target])
+    infinite = graph.any_branch_in_rows(index, same)
+    if goal.kind is Kind.REWARD:
+        infinite &= ~graph.any_branch_in(index, task.fixed == -np.inf)
+    value = task.fixed[index.choice_to_state]
+    worst = goal.unreached if goal.kind is Kind.REWARD or not goal.maximise else np.nan
+    best = np.where(np.isinf(value), (value == worst) | infinite, leads & ~goal.costly)
+    return best & ~task.open[index.choice_to_state] | ~goal.running[index.choice_to_state]
+
+
 def first_tied(task: Task, tied: Bools) -> Nodes:
     """Return for every state the first listed of its tied choices with which the policy arrives, ``[S]``.
 
@@ -75,17 +94,18 @@ def first_tied(task: Task, tied: Bools) -> Nodes:
     if not inside.any():
         return choice
     leaving = tied & inside[index.choice_to_state] & ~internal
-    onward = _onward(task.goal.mdp, index, component, leaving, internal)
+    onward = _onward(task.goal, component, leaving, internal)
     exits = np.where(onward >= 0, -1, graph.first_listed(index, leaving))
     level = graph.levels_to(index, (onward >= 0) | (exits >= 0), inside, internal)
     down = graph.first_downhill(index, level, internal)
     return np.where(inside, np.where(onward >= 0, onward, np.where(exits >= 0, exits, down)), choice)
 
 
-def _onward(mdp: MDP, index: Index, component: Nodes, leaving: Bools, internal: Bools) -> Nodes:
+def _onward(goal: Goal, component: Nodes, leaving: Bools, internal: Bools) -> Nodes:
     """Return the same for the likely branches alone: -1 where they lead to no exit."""
+    index = goal.index
     moves = index.branch_to_target != index.choice_to_state[index.branch_to_choice]
-    chance = np.where(moves, mdp.branch_to_probability, 0.0)
+    chance = np.where(moves, goal.probability, 0.0)
     likeliest = np.maximum.reduceat(chance, index.choice_to_branches[:-1])
     likely = chance >= LIKELY * np.maximum(likeliest, 1e-300)[index.branch_to_choice]
     rows = np.concatenate([[0], np.cumsum(np.add.reduceat(likely.astype(np.int64), index.choice_to_branches[:-1]))])

@@ -49,7 +49,7 @@ class Budget:
     fill: int = 200_000_000
 
 
-def search(core: Core, budget: Budget, judge: Judge) -> None:
+def search(core: Core, budget: Budget, judge: Judge) -> Array | None:
     """Offer candidates to a judge until there is nothing better to offer.
 
     Parameters
@@ -59,6 +59,11 @@ def search(core: Core, budget: Budget, judge: Judge) -> None:
     judge : callable
         Given values of nodes, and the rows of a policy or None for what no policy can beat: whether they are a bound, and
         whether the bounds that were found are near enough to each other.
+
+    Returns
+    -------
+    array of int, ``[n]``, or None
+        The rows of a policy that looks better than all, but never leaves the open states from some node.
     """
     rows, fill = None, _fill(core) if core.count > DENSE else 0
     if fill > EASY:
@@ -67,9 +72,8 @@ def search(core: Core, budget: Budget, judge: Judge) -> None:
         if y is not None:
             rows = sweeper.best(core.rows.price, y)
             if _iterated(sweeper, y, rows, budget, judge):
-                return
-    if fill <= budget.fill:
-        _solved(core, rows, budget, judge)
+                return None
+    return _solved(core, rows, budget, judge) if fill <= budget.fill else None
 
 
 def _toward(core: Core) -> float:
@@ -116,7 +120,7 @@ class _Sweeper:
         reduce = np.maximum.reduceat if core.problem.frame.maximise else np.minimum.reduceat
         for sweep in range(1, most + 1):
             z = reduce(fixed + self.matrix @ y, core.begin)
-            change = float((np.abs(z - y) / np.maximum(np.abs(z), 1e-300)).max()) if sweep % 10 == 0 else math.inf
+            change = float((np.abs(z - y) / np.maximum(core.sizes(z), 1e-300)).max()) if sweep % 10 == 0 else math.inf
             y = z
             if change <= near:
                 return np.asarray(y)
@@ -139,7 +143,7 @@ class _Sweeper:
 def _iterated(sweeper: _Sweeper, y: Floats, rows: Array, budget: Budget, judge: Judge) -> bool:
     """Offer what value iteration converges to with shifted prices; return whether that is enough."""
     core = sweeper.core
-    shift = _toward(core) * SHIFT * y[core.owner] * core.leaving
+    shift = _toward(core) * SHIFT * core.sizes(y)[core.owner] * core.leaving
     bound = sweeper.converged(core.rows.price + shift, y, SHIFT / 3, budget.sweeps)
     rest = np.zeros(core.count)
     if bound is None or not judge((bound, rest), None)[0]:
@@ -149,13 +153,13 @@ def _iterated(sweeper: _Sweeper, y: Floats, rows: Array, budget: Budget, judge: 
     return reached is not None and judge((reached, rest), rows)[1]
 
 
-def _solved(core: Core, rows: Array | None, budget: Budget, judge: Judge) -> None:
+def _solved(core: Core, rows: Array | None, budget: Budget, judge: Judge) -> Array | None:
     """Offer what policy iteration finds, moved apart by margins that grow until the checks pass."""
     if rows is None or not core.absorbed(rows):
         rows = core.outward_rows()
     found = None if rows is None else _policy_iteration(core, rows, budget.rounds)
-    if found is None:
-        return
+    if found is None or isinstance(found, np.ndarray):
+        return found
     y, rows, solver = found
     drift, error = core.rows.drift(*core.spread_pair(y))
     finest = 1024.0 * ROUNDING**2 * np.abs(y[0])[core.owner] + 1e-300  # what a value in two parts can tell apart
@@ -170,7 +174,8 @@ def _solved(core: Core, rows: Array | None, budget: Budget, judge: Judge) -> Non
             margin = _refined(core.rows.some(rows).priced(2.0 * slack[rows]), solver, core, 0.0)
             attained = judge(_moved(y, margin, -_toward(core)), rows)[0]
         if beaten and attained:
-            return
+            return None
+    return None
 
 
 def _moved(y: Pair, margin: Pair, sign: float) -> Pair:
@@ -213,8 +218,11 @@ def _largest_sum(core: Core, slack: Floats, gap: Floats, policy: tuple[Array, So
     return None
 
 
-def _policy_iteration(core: Core, rows: Array, rounds: int) -> tuple[Pair, Array, Solver] | None:
-    """Improve a policy until nothing is better by more than rounding, and a little further; None where that fails."""
+def _policy_iteration(core: Core, rows: Array, rounds: int) -> tuple[Pair, Array, Solver] | Array | None:
+    """Improve a policy until nothing is better by more than rounding, and a little further; None where that fails.
+
+    Returned is a policy alone where it would be better, but never leaves the open states.
+    """
     sweeper = _Sweeper.of(core) if core.count > DENSE else None
     further = FINE_ROUNDS
     for _ in range(rounds):
@@ -226,7 +234,7 @@ def _policy_iteration(core: Core, rows: Array, rounds: int) -> tuple[Pair, Array
             return None
         drift, error = core.rows.drift(*core.spread_pair(y))
         best = core.best(drift / core.leaving)
-        gain = _toward(core) * drift[best]
+        gain = np.where(best == rows, 0.0, _toward(core) * drift[best] - np.abs(drift[rows]))
         coarse = gain > 8.0 * error[best] + 32.0 * np.spacing(np.abs(y[0]))
         fine = gain > 8.0 * error[best] + 1024.0 * ROUNDING**2 * np.abs(y[0])
         if not fine.any() or (not coarse.any() and further == 0):
@@ -238,7 +246,7 @@ def _policy_iteration(core: Core, rows: Array, rounds: int) -> tuple[Pair, Array
             swept = sweeper.swept(core.rows.price, y[0], BETWEEN)
             rows = swept if core.absorbed(swept) else rows
         if not core.absorbed(rows):
-            return None
+            return rows
     return None
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ratherthan.explain.explanation import Closing, Explanation
 from ratherthan.model.mdp import Bools
 from ratherthan.verify.interval import Order, order
-from ratherthan.verify.measure import Measures
+from ratherthan.verify.levels import Levels
 from ratherthan.verify.verdict import Check, Verdict
 
 __all__ = ["ClosingCheck"]
@@ -21,13 +21,13 @@ class ClosingCheck:
     Parameters
     ----------
     told : Explanation
-    measures : Measures
+    levels : Levels
     reached : array of bool, ``[S]``
         What the policy reaches from the start.
     """
 
     told: Explanation
-    measures: Measures
+    levels: Levels
     reached: Bools  # [S]
 
     def check(self) -> Check:
@@ -56,22 +56,32 @@ class ClosingCheck:
             return ("not all other decisions are equivalent" if False in equal else None), None in equal
         if closing.printed != (alpha > 0 and closing.largest_difference is not None):
             return "it must be printed exactly where the largest difference is known and asked for", False
-        if False not in equal and None not in equal and self.measures.slack < math.inf:
+        if False not in equal and None not in equal and self.levels.slack < math.inf:
             return "all other decisions are equivalent", False
-        spreads = [self.measures.difference(state) for state in untold]
+        spreads = [self.levels.measures[0].difference(state) for state in untold]
         if closing.largest_difference is None:
-            known = all(number.finite for spread in spreads for number in spread) and self.measures.slack < math.inf
+            known = all(number.finite for spread in spreads for number in spread) and self.levels.slack < math.inf
+            known &= any(high.lower > low.upper for high, low in spreads)  # else it is a further level that they change
             return ("the largest difference is known" if known else None), False
         low = max(0.0, *(high.lower - low.upper for high, low in spreads))
         most = max(high.upper - low.lower for high, low in spreads)
-        near = 2e-6 * max(abs(number.upper) for spread in spreads for number in spread)
+        size = self.levels.measures[0].size
+        near = 2e-6 * max(size, *(abs(number.upper) for spread in spreads for number in spread))
         if not low - near <= closing.largest_difference <= most + near:
             return f"the largest difference lies in [{low:.10g}, {most:.10g}], got {closing.largest_difference}", False
         return None, False
 
     def _equivalent(self, state: int) -> bool | None:
-        """Return whether all choices of a state have finite and equal numbers."""
-        numbers = list(self.measures.numbers(state).values())
+        """Return whether all choices of a state have finite and equal numbers at every level that has not ended there."""
+        found = [
+            self._equal_at(level, state)
+            for level, frame in enumerate(self.levels.frames)
+            if level == 0 or frame.running[state]
+        ]
+        return False if False in found else None if None in found else True
+
+    def _equal_at(self, level: int, state: int) -> bool | None:
+        numbers = list(self.levels.measures[level].numbers(state).values())
         if any(number.infinite for number in numbers):
             return False
         orders = {order(x, y, self.told.question.tolerance) for i, x in enumerate(numbers) for y in numbers[i + 1 :]}
@@ -84,7 +94,7 @@ class ClosingCheck:
         closing = self.told.closing
         off = self.reached.copy()
         off[list(self.told.route)] = False
-        (sure, maybe), (must, may) = self.measures.critical, self.measures.admitted
+        (sure, maybe), (must, may) = self.levels.critical, self.levels.admitted
         known = int((must & off).sum()), int((maybe & off).sum())
         reach = int((sure & off).sum()), int((may & off).sum())
         certain, possible = closing.off_route, closing.off_route + closing.off_route_open

@@ -7,16 +7,16 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from ratherthan.errors import ExplanationError, InputError, PropertyError
-from ratherthan.explain.explanation import Explanation, ObjectiveRecord, Tally
+from ratherthan.errors import ExplanationError, InputError
+from ratherthan.explain.explanation import Explanation, Measured, Step, Tally, Unfolded
 from ratherthan.explain.question import Question
 from ratherthan.explain.record import digest, from_document, to_document
-from ratherthan.model.objective import ExpectedCost, Objective
+from ratherthan.model.mdp import MDP
 from ratherthan.model.problem import Problem
-from ratherthan.model.property import parse_property
 from ratherthan.narrate import narrate
+from ratherthan.verify.wanted import refuse
 
-__all__ = ["OUTCOMES", "load", "objective_of", "refuse_foreign", "refuse_retold"]
+__all__ = ["OUTCOMES", "load", "refuse_foreign", "refuse_retold"]
 
 OUTCOMES = (
     "The values are proved: one check by Bellman's operator confirmed the bounds.",
@@ -27,8 +27,8 @@ OUTCOMES = (
 )
 """How a solver may say it ended; the first is full success."""
 
-LOOSEST = 0.01
-"""A tolerance above one per cent would call different numbers equal."""
+LOOSEST = 1e-4
+"""A larger tolerance would call numbers equal that are printed as different."""
 
 _KINDS = {
     "none": ("none", frozenset[str]()),
@@ -39,13 +39,6 @@ _KINDS = {
     "selective": ("route", frozenset({"selectiveness"})),
     "contrastive": ("route", frozenset({"selectiveness", "constrictiveness", "responsibility"})),
 }
-
-
-def _refuse(must: str, got: object, **place: Any) -> NoReturn:
-    raise ExplanationError(
-        f"{must}, got {got}. The explanation was changed after it was made, or belongs to another model: make it again.",
-        **place,
-    )
 
 
 def load(source: Mapping[str, Any] | str | Path) -> tuple[Explanation, str]:
@@ -69,13 +62,13 @@ def load(source: Mapping[str, Any] | str | Path) -> tuple[Explanation, str]:
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
         raise ExplanationError(f"An explanation must be a JSON document of numbers and text; {error}.") from None
     if claimed != own:
-        _refuse(f"The digest of an explanation must be that of its content, {own}", claimed)
+        refuse(f"The digest of an explanation must be that of its content, {own}", claimed)
     for where, number in _integers(explanation):
         if type(number) is not int:
-            _refuse(f"A state, choice or count must be a whole number at {where}", repr(number))
+            refuse(f"A state, choice or count must be a whole number at {where}", repr(number))
     missing = {state for where, state in _states(explanation) if where != "policy"} - set(explanation.states)
     if missing:
-        _refuse("Every state that is mentioned must have a record", f"none of state {min(missing)}")
+        refuse("Every state that is mentioned must have a record", f"none of state {min(missing)}")
     _refuse_difference(document, to_document(explanation, text), "")
     _refuse_contradictions(explanation)
     return explanation, text
@@ -90,7 +83,7 @@ def _refuse_difference(got: Any, wanted: Any, where: str) -> None:
         for i, (one, other) in enumerate(zip(got, wanted, strict=True)):
             _refuse_difference(one, other, f"{where}[{i}]")
     elif got != wanted:
-        _refuse(f"The document must agree with itself: {where} must be {wanted!r}", repr(got), where=where)
+        refuse(f"The document must agree with itself: {where} must be {wanted!r}", repr(got), where=where)
 
 
 def _read(path: Path) -> Any:
@@ -125,6 +118,9 @@ def _integers(told: Explanation) -> Iterator[tuple[str, object]]:
     for name in ("route", "circle", "in_the_way", "size"):
         yield from ((name, number) for number in getattr(told, name))
     yield "circle_size", told.circle_size
+    if told.unfolded is not None:
+        yield "unfolded.states", told.unfolded.states
+        yield "unfolded.memories", told.unfolded.memories
     yield "closing.off_route", told.closing.off_route
     yield "closing.off_route_open", told.closing.off_route_open
     for state, choice, _ in told.policy.choices:
@@ -135,11 +131,14 @@ def _integers(told: Explanation) -> Iterator[tuple[str, object]]:
     for step in told.steps:
         yield from (("steps", number) for number in (step.state, step.choice, step.choice_index))
         for claim in step.claims:
+            yield "claims", claim.level
             for row in (claim.evidence.taken, *claim.evidence.others):
                 yield "claims", row.choice
                 if isinstance(row, Tally):
                     yield from (("claims", number) for number in (row.lower, row.upper))
             yield from (("claims", state) for state, _, _ in claim.evidence.follows)
+        for judged in (judged for trade in step.trades for judged in trade.judged):
+            yield from (("trades", n) for n in (judged.objective, judged.taken.choice, judged.other.choice))
 
 
 def _refuse_contradictions(told: Explanation) -> None:
@@ -147,22 +146,26 @@ def _refuse_contradictions(told: Explanation) -> None:
     asked = told.question
     wanted = _kind_of(asked)
     if asked.kind != wanted:
-        _refuse(f"The kind of this scope and these factors must be '{wanted}'", f"'{asked.kind}'")
+        refuse(f"The kind of this scope and these factors must be '{wanted}'", f"'{asked.kind}'")
     if not 0.0 < asked.tolerance <= LOOSEST:
-        _refuse(f"The tolerance of comparisons must be above 0 and at most {LOOSEST}", asked.tolerance)
+        refuse(f"The tolerance of comparisons must be above 0 and at most {LOOSEST}", asked.tolerance)
     if asked.rather_than is not None and asked.scope != "state":
-        _refuse("'rather than' must ask about one state", f"scope '{asked.scope}'")
+        refuse("'rather than' must ask about one state", f"scope '{asked.scope}'")
     if told.outcome not in OUTCOMES:
-        _refuse("The outcome must be one of the solver's sentences", f"'{told.outcome}'")
+        refuse("The outcome must be one of the solver's sentences", f"'{told.outcome}'")
     if asked.state is not None and told.start != asked.state:
-        _refuse(f"The start must be the state asked about, {asked.state}", told.start)
+        refuse(f"The start must be the state asked about, {asked.state}", told.start)
     if asked.scope != "route" and (told.route or told.route_probability is not None or told.arrival is not None):
-        _refuse("A route must be given only where one was asked for", f"scope '{asked.scope}'")
+        refuse("A route must be given only where one was asked for", f"scope '{asked.scope}'")
     for step in told.steps:
         for claim in step.claims:
             names = tuple(row.action for row in claim.evidence.others)
             if claim.against != names:
-                _refuse(f"'{claim.claim}' must be claimed against the actions of its evidence, {names}", claim.against)
+                refuse(f"'{claim.claim}' must be claimed against the actions of its evidence, {names}", claim.against)
+        for trade in step.trades:
+            names = (trade.judged[0].other.action,)
+            if trade.against != names:
+                refuse(f"'{trade.claim}' must be claimed against the action of its evidence, {names}", trade.against)
 
 
 def _kind_of(asked: Question) -> str:
@@ -176,62 +179,48 @@ def _kind_of(asked: Question) -> str:
     return f"{asked.scope}: {', '.join(listed) or 'no factors'}"
 
 
-def objective_of(told: Explanation, problem: Problem) -> Objective:
-    """Return the objective of an explanation on a model.
-
-    Raises
-    ------
-    ExplanationError
-        If it does not fit the model, or its record says something else.
-    """
-    try:
-        wanted = parse_property(told.property, problem)
-    except PropertyError as error:
-        raise ExplanationError(f"The property of an explanation must fit the model: {error}", **error.place) from None
-    if not isinstance(wanted, Objective):
-        _refuse("The property of an explanation must ask for a value", f"'{told.property}'")
-    record = _record(wanted)
-    if told.objective != record:
-        _refuse(f"The record of the objective must say what the property says, {record}", told.objective)
-    return wanted
-
-
-def _record(wanted: Objective) -> ObjectiveRecord:
-    if isinstance(wanted, ExpectedCost):
-        return ObjectiveRecord(kind="cost", reward=wanted.reward, maximise=wanted.maximise)
-    if not wanted.maximise:
-        return ObjectiveRecord(kind="risk", maximise=False)
-    return ObjectiveRecord(kind="probability" if wanted.through is None else "safety", maximise=True)
-
-
 def refuse_foreign(told: Explanation, problem: Problem) -> None:
     """Raise where an explanation names states, choices or actions that the model has not, or calls otherwise."""
-    mdp = problem.mdp
+    mdp, unfolding = problem.mdp, problem.unfolding
+    unfolded = None
+    if unfolding is not None:
+        unfolded = Unfolded(states=unfolding.origin.mdp.states, memories=len(unfolding.left))
+    if told.unfolded != unfolded:
+        refuse(f"What the model was unfolded from must be {unfolded}", told.unfolded)
     for where, state in _states(told):
         if not 0 <= state < mdp.states:
-            _refuse(f"A state must be a number from 0 to {mdp.states - 1} at {where}", state, state=state)
+            refuse(f"A state must be a number from 0 to {mdp.states - 1} at {where}", state, state=state)
     for state, record in told.states.items():
         place = None if problem.world is None else problem.world.place(state)
         name, named = mdp.names[state], mdp.names.named
         if (record.name, record.named, record.place) != (name, named, place):
-            _refuse(
+            refuse(
                 f"State {state} must be called '{name}' at {place}", f"'{record.name}' at {record.place}", state=state
             )
     for step in told.steps:
-        own = mdp.choices_of(step.state)
-        rows = [row for claim in step.claims for row in (claim.evidence.taken, *claim.evidence.others)]
-        for choice, action in [(step.choice, step.action), *((row.choice, row.action) for row in rows)]:
-            if choice not in own:
-                _refuse(f"State {step.state} has the choices {own.start} to {own.stop - 1}", choice, state=step.state)
-            if action != mdp.action_name(choice):
-                _refuse(f"Choice {choice} must be called '{mdp.action_name(choice)}'", f"'{action}'", state=step.state)
-        if step.choice_index != step.choice - own.start:
-            _refuse(f"Choice {step.choice} must be number {step.choice - own.start} of its state", step.choice_index)
-        foils = [mdp.action_name(choice) for choice in own if choice != step.choice]
-        if step.foil is not None and step.foil not in foils:
-            _refuse(f"The foil must be another action of state {step.state}, one of {foils}", f"'{step.foil}'")
-        if step.foil != told.question.rather_than:
-            _refuse(f"The foil must be what was asked about, {told.question.rather_than!r}", repr(step.foil))
+        _refuse_foreign_step(step, mdp, told.question.rather_than)
+
+
+def _refuse_foreign_step(step: Step, mdp: MDP, asked: str | None) -> None:
+    """Raise where a step names choices or actions that its state has not, or calls otherwise."""
+    own = mdp.choices_of(step.state)
+    rows: list[Measured | Tally] = []
+    for claim in step.claims:
+        rows += [claim.evidence.taken, *claim.evidence.others]
+    for judged in (judged for trade in step.trades for judged in trade.judged):
+        rows += [judged.taken, judged.other]
+    for choice, action in [(step.choice, step.action), *((row.choice, row.action) for row in rows)]:
+        if choice not in own:
+            refuse(f"State {step.state} has the choices {own.start} to {own.stop - 1}", choice, state=step.state)
+        if action != mdp.action_name(choice):
+            refuse(f"Choice {choice} must be called '{mdp.action_name(choice)}'", f"'{action}'", state=step.state)
+    if step.choice_index != step.choice - own.start:
+        refuse(f"Choice {step.choice} must be number {step.choice - own.start} of its state", step.choice_index)
+    foils = [mdp.action_name(choice) for choice in own if choice != step.choice]
+    if step.foil is not None and step.foil not in foils:
+        refuse(f"The foil must be another action of state {step.state}, one of {foils}", f"'{step.foil}'")
+    if step.foil != asked:
+        refuse(f"The foil must be what was asked about, {asked!r}", repr(step.foil))
 
 
 def _states(told: Explanation) -> Iterator[tuple[str, int]]:
@@ -253,4 +242,4 @@ def refuse_retold(told: Explanation, text: str) -> None:
     except (InputError, KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
         raise ExplanationError(f"An explanation must be one that can be told: {error}.") from None
     if own != text:
-        _refuse(f"The text must be what the data say, '{own}'", f"'{text}'")
+        refuse(f"The text must be what the data say, '{own}'", f"'{text}'")

@@ -50,6 +50,8 @@ class Rows:
 
     source: Array  # [m] the state (or node) of each row
     price: Floats  # [m]
+    blur: Floats  # [m] the rounding error of the price
+    fading: float  # the chance that a step is the last one, whatever is chosen
     first: Array  # [m] where the entries of each row begin
     entry_row: Array  # [e]
     target: Array  # [e]
@@ -66,14 +68,21 @@ class Rows:
         if rest is not None:
             further = rest[self.target] - rest[origin]
             apart, size = apart + further, size + np.abs(further)
-        size = self.price + np.add.reduceat(self.share * size, self.first)
+        drift = self.price + np.add.reduceat(self.share * apart, self.first)
+        size = np.abs(self.price) + np.add.reduceat(self.share * size, self.first)
+        if self.fading:
+            ending = self.fading * x[self.source]
+            drift, size = drift - ending, size + np.abs(ending)
+            if rest is not None:
+                ending = self.fading * rest[self.source]
+                drift, size = drift - ending, size + np.abs(ending)
         degree = np.diff(np.append(self.first, len(self.target)))
-        error = (2 * degree + 16) * ROUNDING * size + np.where(size > 0.0, degree * 1e-320, 0.0)
-        return self.price + np.add.reduceat(self.share * apart, self.first), error
+        error = (2 * degree + 20) * ROUNDING * size + np.where(size > 0.0, degree * 1e-320, 0.0) + self.blur
+        return drift, error
 
     def priced(self, price: Floats) -> Rows:
-        """Return the same rows at another price."""
-        return replace(self, price=price)
+        """Return the same rows at another price, which is taken as it is."""
+        return replace(self, price=price, blur=np.zeros(len(price)))
 
     def some(self, which: Array) -> Rows:
         """Return some of the rows."""
@@ -83,6 +92,8 @@ class Rows:
         return Rows(
             source=self.source[which],
             price=self.price[which],
+            blur=self.blur[which],
+            fading=self.fading,
             first=np.concatenate([[0], np.cumsum(count)[:-1]]).astype(np.int64),
             entry_row=np.repeat(np.arange(len(which)), count),
             target=self.target[entry],
@@ -106,11 +117,21 @@ def rows_of(problem: Open, choices: Array) -> Rows:
     return Rows(
         source=source,
         price=np.bincount(row, weights=part * frame.price[choices], minlength=len(source)).astype(np.float64),
+        blur=_mixed_blur(problem, choices, row, part),
+        fading=1.0 - frame.discount,
         first=np.searchsorted(entry_row, np.arange(len(source))).astype(np.int64),
         entry_row=entry_row,
         target=mdp.branch_to_target[entry].astype(np.int64),
-        share=np.repeat(part, end - begin) * frame.share[entry],
+        share=np.repeat(part, end - begin) * frame.share[entry] * frame.discount,
     )
+
+
+def _mixed_blur(problem: Open, choices: Array, row: Array, part: Floats) -> Floats:
+    """Return the rounding error of the prices of rows that may mix several choices, ``[m]``."""
+    blur, price = problem.frame.blur[choices], np.abs(problem.frame.price[choices])
+    if problem.weight is not None:
+        blur = part * (blur + 16 * ROUNDING * price)
+    return np.bincount(row, weights=blur).astype(np.float64)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -140,6 +161,11 @@ class Core:
         """Return values in two parts as values of states, ``[S]`` each; the known ones have no second part."""
         return self.spread(pair[0], known), self.spread(pair[1], 0.0)
 
+    def sizes(self, y: Floats) -> Floats:
+        """Return by what the values of nodes are measured: their own size, and the largest where signs may differ, ``[n]``."""
+        size = np.abs(y)
+        return np.full_like(size, size.max(initial=0.0)) if self.problem.frame.signed else size
+
     def largest(self, worth: Floats) -> Array:
         """Return the row of each node that is worth most, the first of several, ``[n]``."""
         most = np.maximum.reduceat(worth, self.begin)
@@ -167,7 +193,7 @@ class Core:
         order = np.argsort(target, kind="stable")
         begin = np.searchsorted(target[order], np.arange(self.count + 1))
         taken = np.full(self.count, -1, dtype=np.int64)
-        hit = np.unique(rows.entry_row[target < 0])
+        hit = np.arange(len(owner)) if rows.fading else np.unique(rows.entry_row[target < 0])
         while len(hit):
             hit = hit[taken[owner[hit]] < 0]
             fresh, where = np.unique(owner[hit], return_index=True)
@@ -216,6 +242,8 @@ class Core:
 
 def leaves(problem: Open, rows: Rows) -> bool:
     """Return whether a policy, one row per open state, leaves the open states with probability 1."""
+    if rows.fading:
+        return True
     out = ~problem.open
     order = np.argsort(rows.target, kind="stable")
     begin = np.searchsorted(rows.target[order], np.arange(len(out) + 1))
@@ -235,7 +263,7 @@ def core_of(problem: Open, every: Rows) -> Core:
     node = np.full(len(problem.block), -1, dtype=np.int64)
     node[opened] = local
     outward = node[every.target] != node[every.source][every.entry_row]
-    leaving = np.bincount(every.entry_row, every.share * outward, len(every.source)).astype(np.float64)
+    leaving = np.bincount(every.entry_row, every.share * outward, len(every.source)).astype(np.float64) + every.fading
     number = np.flatnonzero(leaving > 0)
     number = number[np.argsort(node[every.source[number]], kind="stable")]
     rows = every.some(number)

@@ -12,6 +12,11 @@ distribution of R gives 0 ≥ mean r, strictly where it changed, against r ≥ 0
 nothing changed, the policy before would have had R. At the end, x = T x is the value of a policy; x ≤ T x bounds the cost of
 every policy that arrives from below, x ≥ T x with x ≥ 0 bounds every probability and cost from above.
 
+Where rewards have both signs and arrival is demanded, the same R proves that more and more can be gathered: going round in R
+pays mean r > 0 per step (< 0 when minimising), and from R the target can still be reached for sure. So the value is ∞ (-∞)
+wherever R can be reached; these states are set aside, and the rest, which cannot get there, goes on. At the end x = T x bounds
+every policy that arrives. With a discount every policy is absorbed.
+
 The probabilities of a choice are its doubles, taken as fractions and divided by their sum.
 
 References
@@ -41,19 +46,9 @@ def row_of(frame: Frame, choice: int) -> Row:
     spread: dict[int, Fraction] = {}
     for target, chance in zip(mdp.branch_to_target[branches], chances, strict=True):
         spread[int(target)] = spread.get(int(target), Fraction(0)) + chance / total
-    if not frame.costs:
-        return Fraction(0), spread
-    if frame.reward is None:
-        return Fraction(1), spread
-    parts, price = mdp.rewards[frame.reward], Fraction(0)
-    if parts.state is not None:
-        price += Fraction(float(parts.state[frame.row_state[choice]]))
-    if parts.choice is not None:
-        price += Fraction(float(parts.choice[choice]))
-    if parts.branch is not None:
-        paid = [Fraction(float(b)) for b in parts.branch[branches]]
-        price += sum((p * b for p, b in zip(chances, paid, strict=True)), Fraction(0)) / total
-    return price, spread
+    if frame.endless:
+        spread = {target: Fraction(frame.discount) * onward for target, onward in spread.items()}
+    return Fraction(0) if frame.prices is None else frame.prices.exactly(choice), spread
 
 
 def eliminate(rows: Mapping[int, Row]) -> dict[int, Fraction]:
@@ -91,8 +86,8 @@ def _settled(row: Row, known: Floats, unknown: Collection[int]) -> Row:
     return cost, {target: chance for target, chance in row[1].items() if target in unknown}
 
 
-def best_exactly(frame: Frame, unknown: Array, rows: Bools, known: Floats, first: Array) -> dict[int, Fraction]:
-    """Return the optimum in the unknown states.
+def best_exactly(frame: Frame, unknown: Array, rows: Bools, known: Floats, first: Array) -> dict[int, Fraction | None]:
+    """Return the optimum in the unknown states, None where more and more can be gathered.
 
     Parameters
     ----------
@@ -109,13 +104,35 @@ def best_exactly(frame: Frame, unknown: Array, rows: Bools, known: Floats, first
     states = set(map(int, unknown))
     offers = {s: {c: row_of(frame, c) for c in frame.mdp.choices_of(s) if rows[c]} for s in states}
     settled = {s: {c: _settled(row, known, states) for c, row in offer.items()} for s, offer in offers.items()}
+    endless: dict[int, Fraction | None] = {}
     taken = {s: int(first[s]) for s in states}
     while True:
         found = eliminate({s: settled[s][taken[s]] for s in states})
         better = {s: _better(settled[s], taken[s], found, maximise=frame.maximise) for s in states}
         if better == taken:
-            return found
+            return endless | found
         taken = better
+        if frame.demanding:
+            growing = _never_leaving({s: settled[s][taken[s]] for s in states})
+            gathering = _leading(growing, {s: {t for _, row in settled[s].values() for t in row} for s in states})
+            endless |= dict.fromkeys(gathering)
+            states -= gathering
+
+
+def _never_leaving(rows: Mapping[int, Row]) -> set[int]:
+    """Return the states from which a policy, one row per state, never leaves the states at all."""
+    leaving = {s for s, (_, spread) in rows.items() if sum(spread.values(), Fraction(0)) < 1}
+    return set(rows) - _leading(leaving, {s: set(spread) for s, (_, spread) in rows.items()})
+
+
+def _leading(to: set[int], onward: Mapping[int, set[int]]) -> set[int]:
+    """Return the states from which some state of `to` can be reached."""
+    found = set(to)
+    while True:
+        more = {s for s, targets in onward.items() if s not in found and targets & found}
+        if not more:
+            return found
+        found |= more
 
 
 def _better(offer: Mapping[int, Row], own: int, values: Mapping[int, Fraction], *, maximise: bool) -> int:

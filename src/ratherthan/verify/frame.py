@@ -8,6 +8,8 @@ that is *out*. The searches here are fixpoints of sets of states, computed a lay
 * ``sure(to, via, rows)``: where some policy reaches `to` with probability 1: the largest set X such that `to` is reached with
   rows whose branches all stay in X (de Alfaro 1997);
 * ``blocks``: maximal end components, where a run can go round for ever.
+
+Where later rewards count less (a discount γ < 1) no run ends by itself: it is as if each step ended it with the chance 1 - γ.
 """
 
 from __future__ import annotations
@@ -18,12 +20,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from ratherthan.model.formula import states_where
 from ratherthan.model.mdp import MDP, Bools, Floats
-from ratherthan.model.objective import ExpectedCost, Objective
-from ratherthan.model.problem import Problem
+from ratherthan.verify.prices import Prices
 
-__all__ = ["Array", "Frame", "frame_of", "slices"]
+__all__ = ["Array", "Frame", "parts", "slices"]
 
 Array = npt.NDArray[np.int64]
 
@@ -50,26 +50,58 @@ class Frame:
     ----------
     mdp : MDP
     maximise : bool
-    costs : bool
-        Whether an expected cost is wanted, else a probability.
-    reward : str, optional
-        The name of the reward; None counts steps.
     target, out : array of bool, ``[S]``
         Where a run ends: where it was to go, and where it may not go on.
-    row_state : array of int, ``[C]``
-        The state of each choice.
-    entry_row : array of int, ``[B]``
-        The choice of each branch.
+    prices : Prices, optional
+        What the choices pay where a sum of rewards is wanted; None where a probability is.
+    demanding : bool
+        Whether only policies count that reach the target with probability 1; rewards may then have any sign. Else, and
+        without a discount, no reward is negative.
+    discount : float
+        γ; 1 where all rewards count alike.
+    permitted : array of bool, ``[C]``, optional
+        The choices that may be taken; None for all.
     """
 
     mdp: MDP
     maximise: bool
-    costs: bool
-    reward: str | None
     target: Bools  # [S]
     out: Bools  # [S]
-    row_state: Array  # [C]
-    entry_row: Array  # [B]
+    prices: Prices | None = None
+    demanding: bool = False
+    discount: float = 1.0
+    permitted: Bools | None = None  # [C]
+
+    @cached_property
+    def row_state(self) -> Array:
+        """The state of each choice, ``[C]``."""
+        return np.repeat(np.arange(self.mdp.states), np.diff(self.mdp.state_to_choices)).astype(np.int64)
+
+    @cached_property
+    def entry_row(self) -> Array:
+        """The choice of each branch, ``[B]``."""
+        return np.repeat(np.arange(self.mdp.choices), np.diff(self.mdp.choice_to_branches)).astype(np.int64)
+
+    @cached_property
+    def usable(self) -> Bools:
+        """The choices that may be taken where a run has not ended, ``[C]``."""
+        usable: Bools = self.running[self.row_state]
+        return usable if self.permitted is None else usable & self.permitted
+
+    @property
+    def costs(self) -> bool:
+        """Whether a sum of rewards is wanted, else a probability."""
+        return self.prices is not None
+
+    @property
+    def endless(self) -> bool:
+        """Whether later rewards count less, so that there is no end and no goal."""
+        return self.discount < 1.0
+
+    @property
+    def signed(self) -> bool:
+        """Whether values may have either sign."""
+        return self.demanding or self.endless
 
     @property
     def running(self) -> Bools:
@@ -80,6 +112,11 @@ class Frame:
     def risk(self) -> bool:
         """Whether a probability is to be kept small: then there is no goal to arrive at."""
         return not self.costs and not self.maximise
+
+    @property
+    def aimless(self) -> bool:
+        """Whether there is no goal to arrive at."""
+        return self.risk or self.endless
 
     @property
     def goal(self) -> Bools:
@@ -94,7 +131,7 @@ class Frame:
     @cached_property
     def can_arrive(self) -> Bools:
         """Where some policy reaches the goal with positive probability, ``[S]``; everywhere where there is no goal."""
-        if self.risk:
+        if self.aimless:
             return np.ones(self.mdp.states, dtype=np.bool_)
         return self.reach(self.target, self.running)
 
@@ -107,35 +144,17 @@ class Frame:
     @cached_property
     def price(self) -> Floats:
         """The expected immediate reward of each choice, ``[C]``; 0 where a probability is wanted."""
-        if not self.costs:
-            return np.zeros(self.mdp.choices)
-        if self.reward is None:
-            return np.ones(self.mdp.choices)
-        parts = self.mdp.rewards[self.reward]
-        total = np.zeros(self.mdp.choices)
-        if parts.branch is not None:
-            total += np.add.reduceat(self.share * parts.branch, self.mdp.choice_to_branches[:-1])
-        if parts.choice is not None:
-            total += parts.choice
-        if parts.state is not None:
-            total += parts.state[self.row_state]
-        return np.where(self.pays, np.maximum(total, 5e-324), 0.0)
+        return np.zeros(self.mdp.choices) if self.prices is None else self.prices.price
+
+    @cached_property
+    def blur(self) -> Floats:
+        """A bound of the rounding error of `price`, ``[C]``."""
+        return np.zeros(self.mdp.choices) if self.prices is None else self.prices.blur
 
     @cached_property
     def pays(self) -> Bools:
-        """Which choices cost more than nothing, ``[C]``."""
-        if not self.costs:
-            return np.zeros(self.mdp.choices, dtype=np.bool_)
-        if self.reward is None:
-            return np.ones(self.mdp.choices, dtype=np.bool_)
-        parts, found = self.mdp.rewards[self.reward], np.zeros(self.mdp.choices, dtype=np.bool_)
-        if parts.state is not None:
-            found |= parts.state[self.row_state] > 0
-        if parts.choice is not None:
-            found |= parts.choice > 0
-        if parts.branch is not None:
-            found[self.entry_row[parts.branch > 0]] = True
-        return found
+        """Which choices pay something, ``[C]``."""
+        return np.zeros(self.mdp.choices, dtype=np.bool_) if self.prices is None else self.prices.pays
 
     @cached_property
     def _into(self) -> tuple[Array, Array]:
@@ -273,29 +292,3 @@ def _parts_by_library(count: int, origin: Array, target: Array) -> Array:
     first = np.full(int(component.max()) + 1, count, dtype=np.int64)
     np.minimum.at(first, component, np.arange(count))
     return np.asarray(first[component], dtype=np.int64)
-
-
-def frame_of(problem: Problem, objective: Objective) -> Frame:
-    """Return an objective on a problem's model.
-
-    Raises
-    ------
-    PropertyError
-        For a formula that does not fit the model.
-    """
-    mdp = problem.mdp
-    target = states_where(mdp, objective.goal, problem.definitions)
-    out = np.zeros(mdp.states, dtype=np.bool_)
-    costs = isinstance(objective, ExpectedCost)
-    if not isinstance(objective, ExpectedCost) and objective.through is not None:
-        out = ~states_where(mdp, objective.through, problem.definitions) & ~target
-    return Frame(
-        mdp=mdp,
-        maximise=objective.maximise,
-        costs=costs,
-        reward=objective.reward if isinstance(objective, ExpectedCost) else None,
-        target=target,
-        out=out,
-        row_state=np.repeat(np.arange(mdp.states), np.diff(mdp.state_to_choices)).astype(np.int64),
-        entry_row=np.repeat(np.arange(mdp.choices), np.diff(mdp.choice_to_branches)).astype(np.int64),
-    )

@@ -24,6 +24,7 @@ from ratherthan.model.mdp import Bools, Floats
 
 __all__ = [
     "Bounds",
+    "Ends",
     "Interval",
     "Order",
     "above",
@@ -90,21 +91,21 @@ class Bounds:
         """Whether the number is certainly ∞ or -∞."""
         return self.lower == self.upper and math.isinf(self.lower)
 
-    def widened(self, share: float) -> Bounds:
-        """Return bounds that are wider by a share of the number on either side; 0 and ∞ stay what they are."""
-        lower = self.lower - share * abs(self.lower) if math.isfinite(self.lower) else self.lower
-        upper = self.upper + share * abs(self.upper) if math.isfinite(self.upper) else self.upper
+    def widened(self, share: float, size: float = 0.0) -> Bounds:
+        """Return bounds that are wider by a share of the number, or of `size` where that is larger; ∞ stays what it is."""
+        lower = self.lower - share * max(abs(self.lower), size) if math.isfinite(self.lower) else self.lower
+        upper = self.upper + share * max(abs(self.upper), size) if math.isfinite(self.upper) else self.upper
         return Bounds(lower, upper)
 
-    def covers(self, other: Interval, share: float) -> bool:
+    def covers(self, other: Interval, share: float, size: float = 0.0) -> bool:
         """Whether other bounds are no wider than these widened by a share of the number; by ∞, all bounds are covered."""
         if math.isinf(share):
             return True
-        return self.widened(share).contains(other)
+        return self.widened(share, size).contains(other)
 
-    def vague(self, other: Interval, share: float) -> bool:
+    def vague(self, other: Interval, share: float, size: float = 0.0) -> bool:
         """Whether these bounds are too wide to confirm the other ones: they reach beyond them by more than a share."""
-        return not Bounds(other.lower, other.upper).widened(share).contains(self)
+        return not Bounds(other.lower, other.upper).widened(share, size).contains(self)
 
     def contains(self, other: Interval) -> bool:
         """Whether other bounds lie between these."""

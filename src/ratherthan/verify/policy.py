@@ -10,8 +10,10 @@ import numpy as np
 
 from ratherthan.explain.explanation import Explanation, Step
 from ratherthan.model.mdp import Bools, Floats
-from ratherthan.verify.frame import Frame
+from ratherthan.verify.frame import Array, Frame
 from ratherthan.verify.interval import never_above, order_all
+from ratherthan.verify.levels import Levels
+from ratherthan.verify.numbers import FAINT
 from ratherthan.verify.paths import Moves, moves_of
 from ratherthan.verify.values import Band
 from ratherthan.verify.verdict import Check, Verdict
@@ -95,10 +97,11 @@ class PolicyCheck:
     def _extent(self) -> str | None:
         """Return what is listed though it is never reached, or not listed though it is."""
         frame, told = self.frame, self.told
-        reached = self.reached(told.states)
+        roots = self._roots()
+        reached = self.reached(roots)
         needed = reached & frame.running
         if told.policy.given and told.question.policy_values:
-            for state in told.states:
+            for state in roots:
                 if not reached[state] or frame.running[state]:
                     reached |= frame.explored(state)
         odd = np.flatnonzero(self.said & ~(reached & frame.running))
@@ -109,22 +112,27 @@ class PolicyCheck:
             silent = silent[self.reached([told.start])[silent]] if told.start in self.initial else silent[:0]
         return f"state {silent[0]} is reached, but the policy says nothing of it" if len(silent) else None
 
-    def attains(self, best: Band, followed: Band) -> Check:
-        """Check that the optimal policy is one: its values are the optimum wherever it is listed."""
-        tolerance = self.told.question.tolerance
-        ends = (best.lower[self.said], best.upper[self.said]), (followed.lower[self.said], followed.upper[self.said])
-        more, less = order_all(*ends, tolerance)
-        apart = np.flatnonzero(more | less)
-        where = np.flatnonzero(self.said)
-        if len(apart):
-            state = int(where[apart[0]])
-            reason = f"it is not optimal: another does better from state {state}"
-            return Check(
-                what="optimum", where=self.frame.mdp.names[state], state=state, verdict=Verdict.FAILS, reason=reason
-            )
-        same = never_above(*ends, tolerance) & never_above(ends[1], ends[0], tolerance)
-        verdict = Verdict.HOLDS if bool(same.all()) else Verdict.UNDECIDED
-        return Check(what="optimum", where="", verdict=verdict)
+    def _roots(self) -> list[int]:
+        """Return the states from which the policy must be listed: all that are mentioned, and what alternatives lead to."""
+        mdp, roots = self.frame.mdp, set(self.told.states)
+        for step in self.told.steps:
+            for row in (row for trade in step.trades for row in (trade.judged[0].taken, trade.judged[0].other)):
+                roots |= set(map(int, mdp.branch_to_target[mdp.branches_of(row.choice)]))
+        return sorted(roots)
+
+    def attains(self, levels: Levels) -> Check:
+        """Check that the optimal policy is one: its values are the optimum wherever it is listed, at every level."""
+        undecided = False
+        for level, (frame, best, followed) in enumerate(zip(levels.frames, levels.best, levels.followed, strict=True)):
+            where = np.flatnonzero(self.said & frame.running & ~levels.unbounded(level))
+            size = levels.measures[level].size
+            apart, is_open = _apart(best, followed, where, self.told.question.tolerance, size)
+            undecided |= is_open
+            if apart is not None and levels.attainable(level):
+                name = self.frame.mdp.names[apart]
+                reason = f"it is not optimal{_nth(level)}: another does better from state {apart}"
+                return Check(what="optimum", where=name, state=apart, verdict=Verdict.FAILS, reason=reason)
+        return Check(what="optimum", where="", verdict=Verdict.UNDECIDED if undecided else Verdict.HOLDS)
 
     def step(self, step: Step) -> Check:
         """Check that a step takes the policy's choice, as often as it says."""
@@ -145,3 +153,24 @@ class PolicyCheck:
         if self.told.question.scope == "state" and step.choice != max(own, key=lambda c: (weight[c], -c)):
             return "the policy takes another choice more often"
         return None
+
+
+def _nth(level: int) -> str:
+    return f" at level {level + 1}" if level else ""
+
+
+def _apart(best: Band, followed: Band, where: Array, tolerance: float, size: float) -> tuple[int | None, bool]:
+    """Return a state where two bands differ, None for none, and whether it is open anywhere if they do.
+
+    Where signs may differ, a value near 0 may miss the optimum by what is little beside the others, and that leaves it open.
+    """
+    ends = (best.lower[where], best.upper[where]), (followed.lower[where], followed.upper[where])
+    more, less = order_all(*ends, tolerance)
+    with np.errstate(invalid="ignore"):
+        gap = np.maximum(ends[0][0] - ends[1][1], ends[1][0] - ends[0][1])
+    faint = np.isfinite(gap) & (gap <= tolerance * size)
+    apart = np.flatnonzero((more | less) & ~faint)
+    same = never_above(*ends, tolerance) & never_above(ends[1], ends[0], tolerance)
+    with np.errstate(invalid="ignore"):
+        same |= np.maximum(ends[0][1] - ends[1][0], ends[1][1] - ends[0][0]) <= tolerance * FAINT * size
+    return (int(where[apart[0]]) if len(apart) else None), not bool(same.all())

@@ -101,8 +101,8 @@ class RouteCheck:
         """Return how the route ends."""
         frame, start = self.frame, self.explanation.start
         if not frame.running[start]:
-            return "there" if frame.goal[start] and not frame.risk else "ended"
-        if frame.risk:
+            return "there" if frame.goal[start] and not frame.aimless else "ended"
+        if frame.aimless:
             return "open end"
         if not frame.can_arrive[start]:
             return "no way"

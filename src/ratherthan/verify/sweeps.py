@@ -17,6 +17,9 @@ ended, and x is a bound of the policy's value. So, of an optimum:
 * largest expected cost, least probability: every policy leaves the open states; the checks along all choices, and along
   one policy, bound the optimum from either side.
 * largest probability: x ≥ 0 never rises along all choices → x ≥ P[arrived within k steps] for every policy and k.
+* rewards of any sign until a target that must be reached: only policies that arrive count, so both checks of x, of any sign,
+  along all choices and along one policy that arrives, are bounds. The same with a discount, where every step is the last one
+  with the chance 1 - γ: D(c) = r(c) + γ Σ δ(c, s') · (x(s') - x(s)) - (1 - γ) x(s).
 
 Differences x(s') - x(s) vanish exactly on equal values, so staying in place, and end components on which x is constant,
 cost no precision. x is kept in two parts, a large and a small one, so that the error of D is relative to the differences.
@@ -35,16 +38,21 @@ MDPs and IMDPs, Theor. Comput. Sci. 735, 2018.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ratherthan.model.mdp import Floats
 from ratherthan.verify.candidates import Budget, search
-from ratherthan.verify.equations import Open, Pair, core_of, rows_of
+from ratherthan.verify.equations import Core, Open, Pair, core_of, rows_of
 from ratherthan.verify.frame import Array
+from ratherthan.verify.growth import circling, gathering, paying_inside
 
 __all__ = ["prove"]
 
 ENOUGH = 1e-8
+FAINT = 1e-3
+"""Where signs may differ, a value need not be known better than one of this share of the largest."""
 
 
 def prove(problem: Open, budget: Budget) -> tuple[Floats, Floats]:
@@ -55,9 +63,31 @@ def prove(problem: Open, budget: Budget) -> tuple[Floats, Floats]:
     problem : Open
     budget : Budget
     """
-    ends = np.full(problem.frame.mdp.states, -np.inf), np.full(problem.frame.mdp.states, np.inf)
-    every = rows_of(problem, np.flatnonzero(problem.rows))
-    core = core_of(problem, every)
+    lower, upper = np.full(problem.frame.mdp.states, -np.inf), np.full(problem.frame.mdp.states, np.inf)
+    for _ in range(budget.rounds):
+        core = core_of(problem, rows_of(problem, np.flatnonzero(problem.rows)))
+        demanding = problem.frame.demanding and problem.weight is None
+        growing = np.zeros_like(problem.open)
+        if demanding:
+            growing = paying_inside(core) | circling(problem, budget.sweeps)
+        if not growing.any():
+            never = _searched(core, budget, (lower, upper))
+            if never is None or not demanding:
+                break
+            growing = gathering(core, never)
+            if not growing.any():
+                break
+        endless = problem.frame.reach(growing, problem.open, problem.rows)
+        lower[endless] = upper[endless] = np.inf if problem.frame.maximise else -np.inf
+        problem = replace(problem, open=problem.open & ~endless, rows=problem.rows & ~endless[problem.frame.row_state])
+        if not problem.open.any():
+            break
+    return lower, upper
+
+
+def _searched(core: Core, budget: Budget, ends: tuple[Floats, Floats]) -> Array | None:
+    """Narrow bounds as far as candidates prove them; return what `search` returns."""
+    problem, every = core.problem, core.every
 
     def judge(values: Pair, rows: Array | None) -> tuple[bool, bool]:
         x, rest = core.spread_pair(values)
@@ -68,24 +98,28 @@ def prove(problem: Open, budget: Budget) -> tuple[Floats, Floats]:
             drift, error = drift[taken], error[taken]
         if rows is None or taken is not None:
             below = problem.frame.maximise == (rows is not None)  # on which side it may be a bound
-            proved = _is_bound(x, drift, error, below=below)
+            proved = _is_bound(x[problem.open], drift, error, below=below, signed=problem.frame.signed)
         if proved and below:
             ends[0][problem.open] = np.maximum(ends[0], np.nextafter(x, -np.inf))[problem.open]
         elif proved:
             ends[1][problem.open] = np.minimum(ends[1], np.nextafter(x, np.inf))[problem.open]
-        return proved, _close(ends[0][problem.open], ends[1][problem.open])
+        low, high = ends[0][problem.open], ends[1][problem.open]
+        return proved, _close(low, high, np.abs(x[problem.open]).max() if problem.frame.signed else 0.0)
 
-    search(core, budget, judge)
-    return ends
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is no bound: nothing follows from it
+        return search(core, budget, judge)
 
 
-def _is_bound(x: Floats, drift: Floats, error: Floats, *, below: bool) -> bool:
+def _is_bound(x: Floats, drift: Floats, error: Floats, *, below: bool, signed: bool) -> bool:
     """Return whether x never falls along the rows (a bound from below), or never rises."""
+    if not np.isfinite(x).all():
+        return False
     if below:
         return bool((drift - error >= 0.0).all())
-    return bool((x >= 0.0).all() and (drift + error <= 0.0).all())
+    return bool((signed or (x >= 0.0).all()) and (drift + error <= 0.0).all())
 
 
-def _close(lower: Floats, upper: Floats) -> bool:
+def _close(lower: Floats, upper: Floats, size: float) -> bool:
     """Return whether bounds are so near to each other that it is not worth while to try further candidates."""
-    return bool((np.isfinite(lower) & np.isfinite(upper)).all() and (upper - lower <= ENOUGH * upper).all())
+    finite = bool((np.isfinite(lower) & np.isfinite(upper)).all())
+    return finite and bool((upper - lower <= ENOUGH * np.maximum(np.abs(upper), FAINT * size)).all())

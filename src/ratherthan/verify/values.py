@@ -5,6 +5,10 @@ reached with probability 1, and 0 where that costs nothing. Maximising a cost it
 where nothing is paid. A largest probability is 0 where the target cannot be reached and 1 where it can be reached for sure; a
 least one is 0 where the target can be avoided and 1 where it cannot be missed. The rest is *open*: few states are solved in
 exact fractions (`exact`), many are bounded by sweeps (`sweeps`).
+
+Where arrival is demanded and rewards have any sign, the value is -∞ (minimised: ∞) outside X, and 0 where nothing can be paid
+any more; in the rest it may be ∞ (-∞), which no graph tells: `exact` and `growth` do. The expected total is the limit of the
+expected sums of the first k rewards. With a discount the value is 0 where nothing can be paid any more.
 """
 
 from __future__ import annotations
@@ -25,6 +29,10 @@ from ratherthan.verify.sweeps import prove
 __all__ = ["Band", "arriving", "following", "optimum"]
 
 
+HARD = 4
+"""Where sweeps cannot tell, so many times as many states are solved in fractions."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Band:
     """Bounds of a value per state.
@@ -33,10 +41,13 @@ class Band:
     ----------
     lower, upper : array of float, ``[S]``
         -∞ and ∞ where nothing is known.
+    silent : array of bool, ``[S]``, optional
+        Where nothing can be known, because the policy may come to a state that it says nothing of.
     """
 
     lower: Floats  # [S]
     upper: Floats  # [S]
+    silent: Bools | None = None  # [S]
 
     def __getitem__(self, state: int) -> Bounds:
         """Return the bounds of one state."""
@@ -51,6 +62,10 @@ def optimum(frame: Frame, budget: Budget) -> Band:
     frame : Frame
     budget : Budget
     """
+    if frame.endless:
+        return _discounted(frame, budget)
+    if frame.demanding:
+        return _gathered(frame, budget)
     if frame.costs:
         return _greatest_cost(frame, budget) if frame.maximise else _least_cost(frame, budget)
     return _greatest_chance(frame, budget) if frame.maximise else _least_chance(frame, budget)
@@ -61,73 +76,108 @@ def _none(frame: Frame) -> Array:
 
 
 def _least_cost(frame: Frame, budget: Budget) -> Band:
-    finite = frame.sure(frame.target, frame.running)
-    free = frame.sure(frame.target, finite, ~frame.pays)
+    finite = frame.sure(frame.target, frame.running, frame.usable)
+    free = frame.sure(frame.target, finite, frame.usable & ~frame.pays)
     open_ = finite & ~free
-    rows = frame.rows_within(finite) & open_[frame.row_state]
+    rows = frame.rows_within(finite) & open_[frame.row_state] & frame.usable
     block, _ = frame.blocks(open_, rows & ~frame.pays)
     known = np.where(finite, 0.0, np.inf)
     return _bounded(Open(frame=frame, open=open_, rows=rows, known=known, block=block), budget)
 
 
 def _greatest_cost(frame: Frame, budget: Budget) -> Band:
-    everything = np.ones(frame.mdp.states, dtype=np.bool_)
-    dodging = frame.keep(frame.running, ~everything)
-    infinite = frame.reach(dodging, frame.running)
-    paying = np.zeros(frame.mdp.states, dtype=np.bool_)
-    paying[frame.row_state[frame.pays]] = True
-    open_ = frame.reach(paying & frame.running & ~infinite, frame.running & ~infinite)
+    nowhere = np.zeros(frame.mdp.states, dtype=np.bool_)
+    dodging = frame.keep(frame.running, nowhere, frame.usable)
+    infinite = frame.reach(dodging, frame.running, frame.usable)
+    open_ = _paying(frame, frame.running & ~infinite, frame.usable)
+    rows = open_[frame.row_state] & frame.usable
     known = np.where(infinite, np.inf, 0.0)
-    return _bounded(Open(frame=frame, open=open_, rows=open_[frame.row_state], known=known, block=_none(frame)), budget)
+    return _bounded(Open(frame=frame, open=open_, rows=rows, known=known, block=_none(frame)), budget)
+
+
+def _paying(frame: Frame, inside: Bools, rows: Bools) -> Bools:
+    """Return from where in a set something can still be paid along some rows, ``[S]``."""
+    paying = np.zeros(frame.mdp.states, dtype=np.bool_)
+    paying[frame.row_state[frame.pays & rows]] = True
+    return frame.reach(paying & inside, inside, rows)
+
+
+def _discounted(frame: Frame, budget: Budget) -> Band:
+    open_ = _paying(frame, frame.running, frame.usable)
+    rows, known = open_[frame.row_state] & frame.usable, np.zeros(frame.mdp.states)
+    return _bounded(Open(frame=frame, open=open_, rows=rows, known=known, block=_none(frame)), budget)
+
+
+def _gathered(frame: Frame, budget: Budget) -> Band:
+    arriving = frame.sure(frame.target, frame.running, frame.usable)
+    rows = frame.rows_within(arriving) & frame.usable
+    open_ = _paying(frame, arriving & frame.running, rows)
+    rows &= open_[frame.row_state]
+    block, _ = frame.blocks(open_, rows & ~frame.pays)
+    known = np.where(arriving, 0.0, _hopeless(frame))
+    return _bounded(Open(frame=frame, open=open_, rows=rows, known=known, block=block), budget)
+
+
+def _hopeless(frame: Frame) -> float:
+    """Return the value where arrival is demanded and nobody arrives."""
+    return -np.inf if frame.maximise else np.inf
 
 
 def _greatest_chance(frame: Frame, budget: Budget) -> Band:
-    sure = frame.sure(frame.target, frame.running)
-    open_ = frame.reach(frame.target, frame.running) & ~sure
-    rows = open_[frame.row_state]
+    sure = frame.sure(frame.target, frame.running, frame.usable)
+    open_ = frame.reach(frame.target, frame.running, frame.usable) & ~sure
+    rows = open_[frame.row_state] & frame.usable
     block, _ = frame.blocks(open_, rows)
     known = np.where(sure, 1.0, 0.0)
     return _bounded(Open(frame=frame, open=open_, rows=rows, known=known, block=block), budget)
 
 
 def _least_chance(frame: Frame, budget: Budget) -> Band:
-    avoiding = frame.keep(~frame.target, frame.out)
+    avoiding = frame.keep(~frame.target, frame.out, frame.usable | ~frame.running[frame.row_state])
     open_ = frame.running & ~avoiding
-    missing = frame.reach(avoiding, frame.running)
+    missing = frame.reach(avoiding, frame.running, frame.usable)
     sure = ~missing
     open_ &= missing
+    rows = open_[frame.row_state] & frame.usable
     known = np.where(sure, 1.0, 0.0)
-    return _bounded(Open(frame=frame, open=open_, rows=open_[frame.row_state], known=known, block=_none(frame)), budget)
+    return _bounded(Open(frame=frame, open=open_, rows=rows, known=known, block=_none(frame)), budget)
 
 
 def _bounded(problem: Open, budget: Budget) -> Band:
     """Bound the open states, exactly where they are few."""
     frame, opened = problem.frame, np.flatnonzero(problem.open)
     lower, upper = problem.known.copy(), problem.known.copy()
-    if 0 < len(opened) <= budget.exact:
+    if len(opened) > budget.exact:
+        _take_up(problem, budget, lower, upper)
+    # going round for what cancels is told from a gain by fractions alone
+    unknown = (lower < upper) & (np.isinf(lower) | np.isinf(upper))
+    hard = frame.demanding and len(opened) <= HARD * budget.exact and bool(unknown.any())
+    if 0 < len(opened) <= budget.exact or hard:
         first = _towards(frame, ~problem.open, problem.open, problem.rows)
         for state, value in best_exactly(frame, opened, problem.rows, problem.known, first).items():
-            _place(lower, upper, state, value)
-    elif len(opened):
-        _take_up(problem, budget, lower, upper)
+            _place(lower, upper, state, value if value is not None else -_hopeless(frame))
     return Band(lower=lower, upper=upper)
 
 
 def _take_up(problem: Open, budget: Budget, lower: Floats, upper: Floats) -> None:
     low, high = prove(problem, budget)
-    most = np.inf if problem.frame.costs else 1.0
-    lower[problem.open] = np.maximum(low[problem.open], 0.0)
-    upper[problem.open] = np.minimum(high[problem.open], most)
+    if not problem.frame.signed:
+        low, high = np.maximum(low, 0.0), np.minimum(high, np.inf if problem.frame.costs else 1.0)
+    lower[problem.open], upper[problem.open] = low[problem.open], high[problem.open]
 
 
-def _place(lower: Floats, upper: Floats, state: int, value: Fraction) -> None:
-    bounds = Bounds.around(value)
+def _place(lower: Floats, upper: Floats, state: int, value: Fraction | float) -> None:
+    bounds = Bounds.around(value) if isinstance(value, Fraction) else Bounds(value, value)
     lower[state], upper[state] = bounds.lower, bounds.upper
 
 
 def _towards(frame: Frame, to: Bools, via: Bools, rows: Bools) -> Array:
     """Return for each state of `via` the first choice with a branch nearer to `to`, by layers, ``[S]``."""
     taken = np.full(frame.mdp.states, -1, dtype=np.int64)
+    if frame.endless:  # every choice ends with the chance 1 - γ
+        choices = np.flatnonzero(rows)[::-1]
+        taken[frame.row_state[choices]] = choices
+        return taken
     seen = to.copy()
     frontier = np.flatnonzero(to)
     while len(frontier):
@@ -157,11 +207,12 @@ def following(frame: Frame, weight: Floats, budget: Budget) -> Band:
     arrives = frame.reach(frame.target, frame.running, taken)
     silent = frame.reach(frame.running & ~said, frame.running, taken)
     stuck = frame.reach(~arrives, frame.running, taken)
-    if frame.costs:
-        paying = np.zeros(frame.mdp.states, dtype=np.bool_)
-        paying[frame.row_state[frame.pays & taken]] = True
-        open_ = frame.reach(paying & frame.running & ~stuck, frame.running & ~stuck, taken)
-        known = np.where(stuck & ~frame.target, np.inf, 0.0)
+    if frame.endless:
+        open_, known = _paying(frame, frame.running, taken), np.zeros(frame.mdp.states)
+    elif frame.costs:
+        open_ = _paying(frame, frame.running & ~stuck, taken)
+        missed = _hopeless(frame) if frame.demanding else np.inf
+        known = np.where(stuck & ~frame.target, missed, 0.0)
     else:
         open_ = arrives & stuck & frame.running
         known = np.where(arrives, 1.0, 0.0)
@@ -177,7 +228,7 @@ def following(frame: Frame, weight: Floats, budget: Budget) -> Band:
     elif len(opened):
         _take_up(problem, budget, lower, upper)
     lower[silent], upper[silent] = -np.inf, np.inf
-    return Band(lower=lower, upper=upper)
+    return Band(lower=lower, upper=upper, silent=silent)
 
 
 def arriving(frame: Frame, weight: Floats, budget: Budget) -> Band:
@@ -188,14 +239,5 @@ def arriving(frame: Frame, weight: Floats, budget: Budget) -> Band:
     frame, weight, budget
         As in `following`.
     """
-    chance = Frame(
-        mdp=frame.mdp,
-        maximise=True,
-        costs=False,
-        reward=None,
-        target=frame.goal,
-        out=frame.hazard,
-        row_state=frame.row_state,
-        entry_row=frame.entry_row,
-    )
+    chance = Frame(mdp=frame.mdp, maximise=True, target=frame.goal, out=frame.hazard)
     return following(chance, weight, budget)

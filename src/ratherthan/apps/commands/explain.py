@@ -11,7 +11,7 @@ from ratherthan.apps.options import Command, Wanted, measure_options, option, ou
 EXAMPLES = (
     "ratherthan explain example:paper-5x5",
     "ratherthan explain example:paper-5x5 --state 10 --rather-than south",
-    "ratherthan explain example:delivery -p safest --kind selective",
+    "ratherthan explain example:delivery -p safest --also time",
     "ratherthan explain example:paper-5x5 --output route.json",
 )
 KIND_NAMES = ("none", "naive-state", "responsibility", "constrictive", "naive-path", "selective", "contrastive")
@@ -19,7 +19,7 @@ FORMS = ("text", "json")
 
 
 @click.command("explain", cls=Command, examples=EXAMPLES, short_help="Say what the plan does, and why.")
-@source_options("properties", "constants", "start", "lexicon")
+@source_options("properties", "discount", "constants", "start", "lexicon")
 @option(
     "--kind",
     section="Question",
@@ -46,6 +46,14 @@ FORMS = ("text", "json")
     help="Where: a number from 0, or an exact name.  [default: the initial state]",
 )
 @option("--rather-than", section="Question", metavar="ACTION", help="Why not this action, at the one state?")
+@option(
+    "--also",
+    section="Question",
+    metavar="TEXT",
+    multiple=True,
+    show_default=False,
+    help="Judge the plan and its alternatives by this, too: a property, its name in the source, or a reward that counts until the goal; can be repeated.",
+)
 @option("--detail", section="Question", is_flag=True, help="Say also what the other actions would lead to.")
 @measure_options
 @output_options(*FORMS)

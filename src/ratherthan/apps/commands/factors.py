@@ -19,7 +19,7 @@ FORMS = ("table", "json", "csv", "parquet")
 @click.command(
     "factors", cls=Command, examples=EXAMPLES, short_help="Print the numbers behind the words, a row per choice."
 )
-@source_options("properties", "constants", "start")
+@source_options("properties", "discount", "constants", "start")
 @option(
     "--constrictiveness",
     section="Question",

@@ -17,7 +17,7 @@ FORMS = ("text", "json")
 
 
 @click.command("solve", cls=Command, examples=EXAMPLES, short_help="Print the best value, with bounds that are proved.")
-@source_options("properties", "constants", "start")
+@source_options("properties", "discount", "constants", "start")
 @option(
     "--policy",
     section="Policy",
@@ -27,14 +27,16 @@ FORMS = ("text", "json")
 @option("--minimise-q", section="Policy", is_flag=True, help="In a Q table the smallest number is taken.")
 @output_options(*FORMS)
 def command(wanted: Wanted, form: str | None, output: str | None, **given: Any) -> None:
-    """Print the best value of SOURCE from its start, with bounds that are proved."""
-    from ratherthan.apps.answers import value_document, value_lines
+    """Print the best value of SOURCE from its start, with bounds that are proved.
+
+    A property that cannot be explained is handed to Storm, where it is installed; its answer has no bounds.
+    """
+    from ratherthan.apps.answers import value_lines
     from ratherthan.apps.asked import answer_of
     from ratherthan.apps.output import as_json, form_of, send, send_lines
 
-    solution, wish = answer_of(wanted, **given)
-    document = value_document(solution, wish)
+    document, text = answer_of(wanted, **given)
     if form_of(form, output, FORMS) == "json":
         send([as_json(document)], output)
     else:
-        send_lines(value_lines(document, wish), output)
+        send_lines(value_lines(document, text), output)
