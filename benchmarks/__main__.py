@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import platform
 
-from benchmarks import startup
+from benchmarks import flexibility, maps, startup
 from benchmarks.harness import measure, table
 
 # name: the function that lists its cases. A new benchmark is a module beside this one and a line here.
-BENCHMARKS = {"startup": startup.cases}
+BENCHMARKS = {"startup": startup.cases, "maps": maps.cases, "flexibility": flexibility.cases}
 
 
 def main() -> None:

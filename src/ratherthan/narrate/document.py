@@ -27,7 +27,15 @@ def to_json(explanation: Explanation) -> str:
     from ratherthan.explain.record import to_document
 
     document = to_document(explanation, narrate(explanation))
-    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    rows = document["policy"]["choices"]
+    document["policy"] = document["policy"] | {"choices": []}
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    return text.replace('"choices": []', f'"choices": {_one_a_line(rows)}', 1) + "\n"
+
+
+def _one_a_line(rows: list[list[Any]]) -> str:
+    """Return the rows of a policy, which may be a million, each on a line of its own."""
+    return json.dumps(rows).replace("], [", "],\n      [") if rows else "[]"
 
 
 def from_json(text: str) -> Explanation:
