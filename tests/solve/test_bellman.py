@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from fractions import Fraction
 from math import inf, isinf
 from random import Random
@@ -11,6 +12,8 @@ import pytest
 from exact import optimum_by_enumeration, rows_of
 from random_models import OBJECTIVES, Table, problem_of, random_problem
 
+from ratherthan.model.index import index_of
+from ratherthan.model.mdp import MDP
 from ratherthan.model.objective import ExpectedCost
 from ratherthan.model.policy import Policy
 from ratherthan.solve import action_value_bounds, evaluate, impact_bounds, one_step, solve
@@ -67,3 +70,30 @@ def test_values_of_a_policy_can_be_asked_for() -> None:
         action_value_bounds(given)[0].tolist() == action_value_bounds(given, of_policy=True)[0].tolist() == [2, 1, 1, 0]
     )
     assert impact_bounds(given, of_policy=True)[0].tolist() == [1, 0, 0, 0]
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("below_wins", [False, True])
+def test_means_of_many_branches_are_those_of_few(monkeypatch: pytest.MonkeyPatch, below_wins: bool) -> None:
+    room, rng = sys.modules["ratherthan.solve.bellman"], np.random.default_rng(3)
+    monkeypatch.setattr(room, "is_compiled", lambda _: True)
+    for _ in range(100):
+        states = int(rng.integers(1, 9))
+        choices = rng.integers(1, 4, states)
+        branches = rng.integers(1, 4, int(choices.sum()))
+        mdp = MDP(
+            state_to_choices=np.concatenate([[0], np.cumsum(choices)]),
+            choice_to_branches=np.concatenate([[0], np.cumsum(branches)]),
+            branch_to_target=rng.integers(0, states, int(branches.sum())),
+            branch_to_probability=np.concatenate([rng.dirichlet(np.ones(n)) for n in branches]),
+            initial=np.array([0]),
+        )
+        values = rng.normal(size=states)
+        values[rng.random(states) < 0.2] = np.inf
+        values[rng.random(states) < 0.2] = -np.inf
+        found = []
+        for many in (10**9, 0):
+            monkeypatch.setattr(room, "MANY", many)
+            found.append(room._mean(mdp, index_of(mdp), values, below_wins=below_wins))
+        for few, lots in zip(*found, strict=True):
+            np.testing.assert_allclose(few, lots, rtol=1e-13, atol=1e-15)

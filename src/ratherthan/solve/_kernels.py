@@ -23,6 +23,7 @@ __all__ = [
     "elimination_tree",
     "fill_of",
     "gather_rows",
+    "mean_rows",
     "ordered_rows",
     "substitute",
     "sweep",
@@ -384,3 +385,29 @@ def drift_rows(
         weight[a] = sizes[a] + size
         moved[a] = moves
     return total, weight, moved
+
+
+def mean_rows(
+    choice_to_branches: Ints, branch_to_target: Ints, probability: Floats, values: Floats, below_wins: bool
+) -> tuple[Floats, Floats]:
+    """Return Σ p · value of each choice, and Σ p · |value - that of the first branch|; infinite where a branch is."""
+    count = len(choice_to_branches) - 1
+    mean, spread = np.zeros(count), np.zeros(count)
+    for c in range(count):
+        begin = choice_to_branches[c]
+        first = values[branch_to_target[begin]]
+        below, above = first == -np.inf, first == np.inf
+        moved, size = 0.0, 0.0
+        for b in range(begin + 1, choice_to_branches[c + 1]):
+            after = values[branch_to_target[b]]
+            if np.isinf(after):
+                below, above = below or after < 0.0, above or after > 0.0
+            elif not (below or above):
+                step = probability[b] * (after - first)
+                moved += step
+                size += abs(step)
+        if below or above:
+            mean[c] = -np.inf if below and (below_wins or not above) else np.inf
+        else:
+            mean[c], spread[c] = first + moved, size
+    return mean, spread

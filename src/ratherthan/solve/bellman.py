@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ratherthan.model._kernels import compiled, is_compiled
 from ratherthan.model.index import Index, index_of
 from ratherthan.model.mdp import MDP, Floats
 from ratherthan.model.objective import Discounted, ExpectedReward, Level, Mission, ReachAvoid
+from ratherthan.solve._kernels import mean_rows
 from ratherthan.solve.rewards import paid_of
 from ratherthan.solve.solution import Solution
-from ratherthan.solve.system import ROUNDING, UNDERFLOW, two_sum
+from ratherthan.solve.system import MANY, ROUNDING, UNDERFLOW, two_sum
 
 __all__ = ["action_value_bounds", "impact_bounds", "one_step"]
 
@@ -103,6 +105,9 @@ def _range(level: Level) -> tuple[float, float]:
 
 def _mean(mdp: MDP, index: Index, values: Floats, *, below_wins: bool = False) -> tuple[Floats, Floats]:
     """Return Σ p · value of each choice, and Σ p · |value - that of the first branch|; both ``[C]``."""
+    if mdp.branches > MANY and is_compiled(mdp.branches):
+        kernel = compiled(mean_rows, mdp.branches)
+        return kernel(mdp.choice_to_branches, mdp.branch_to_target, mdp.branch_to_probability, values, below_wins)
     begin = mdp.choice_to_branches[:-1]
     after = values[mdp.branch_to_target]
     first = after[begin]
