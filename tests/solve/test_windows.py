@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.models import slippery_map
 from ratherthan.model.index import build_index
-from ratherthan.model.mdp import MDP, Reward
-from ratherthan.model.objective import ExpectedCost
+from ratherthan.model.mdp import Reward
 from ratherthan.model.problem import Problem
 from ratherthan.solve import PolicyIteration, solve
 from ratherthan.solve.optimum import _systems
@@ -23,32 +23,12 @@ pytestmark = pytest.mark.kernels
 ROOM = sys.modules["ratherthan.solve.windowed"]
 
 
-def town(side: int, seed: int, *, slip: float = 0.1, walls: float = 0.25) -> Problem:
-    """Return a map of four directions with walls, unequal costs, and slips to both sides."""
-    rng = np.random.default_rng(seed)
-    free = rng.random((side, side)) >= walls
-    number = np.full((side, side), -1)
-    number[free] = np.arange(free.sum())
-    states = int(free.sum())
-    row, column = np.nonzero(free)
-    beside = np.empty((states, 4), dtype=np.int64)
-    for k, (down, right) in enumerate([(-1, 0), (0, 1), (1, 0), (0, -1)]):
-        there = number[np.clip(row + down, 0, side - 1), np.clip(column + right, 0, side - 1)]
-        beside[:, k] = np.where(there < 0, np.arange(states), there)
-    ways = [[beside[:, k], beside[:, (k + 1) % 4], beside[:, (k - 1) % 4]] for k in range(4)]
-    target = np.stack([np.stack(way, 1) for way in ways], 1).reshape(-1)
-    goal = np.zeros(states, dtype=np.bool_)
-    goal[-1] = True
-    mdp = MDP(
-        state_to_choices=np.arange(0, 4 * states + 1, 4),
-        choice_to_branches=np.arange(0, 12 * states + 1, 3),
-        branch_to_target=target,
-        branch_to_probability=np.tile([1 - 2 * slip, slip, slip], 4 * states),
-        initial=np.array([0]),
-        labels={"goal": goal},
-        rewards={"time": Reward(choice=np.repeat(rng.integers(1, 4, states).astype(float), 4))},
-    )
-    return Problem(mdp=mdp, objective=ExpectedCost(goal='"goal"', reward="time"))
+def town(side: int, seed: int, *, slip: float = 0.1) -> Problem:
+    """Return a slippery map with unequal costs."""
+    problem = slippery_map(side, slip=slip, seed=seed)
+    paid = np.random.default_rng(seed).integers(1, 4, problem.mdp.states).astype(float)
+    mdp = replace(problem.mdp, rewards={"steps": Reward(choice=np.repeat(paid, 4))})
+    return replace(problem, mdp=mdp)
 
 
 @pytest.mark.parametrize("seed", range(4))
