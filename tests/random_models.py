@@ -67,14 +67,14 @@ LEVELS: dict[str, Objective] = {
         levels=(Mission(formula=f"F<=3 {GOAL}"), ExpectedCost(goal=GOAL, reward="cost"))
     ),
     "safest, then least risk": Lexicographic(levels=(ReachAvoid(goal=GOAL), ReachAvoid(goal=HAZARD, maximise=False))),
-    "likeliest, then the long run": Lexicographic(
-        levels=(ReachAvoid(goal=GOAL), Discounted(reward="gain", discount=0.75))
+    "least risk, then the long run": Lexicographic(
+        levels=(ReachAvoid(goal=HAZARD, maximise=False), Discounted(reward="gain", discount=0.75))
     ),
     "two long runs": Lexicographic(
         levels=(Discounted(reward="cost", discount=0.5, maximise=False), Discounted(reward="gain", discount=0.75))
     ),
-    "gain, then toll": Lexicographic(
-        levels=(ExpectedReward(goal=GOAL, reward="gain"), ExpectedCost(goal=GOAL, reward="toll"))
+    "toll, then gain": Lexicographic(
+        levels=(ExpectedCost(goal=GOAL, reward="toll"), ExpectedReward(goal=GOAL, reward="gain"))
     ),
 }
 """Several levels."""

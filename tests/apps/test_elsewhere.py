@@ -20,7 +20,7 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("stormpy")
     from ratherthan.io._storm_answer import answer
 
-    def run(folder: Path) -> int:
+    def run(folder: Path, patience: float) -> int:
         answer(folder)
         return 0
 
@@ -91,7 +91,7 @@ def test_what_nobody_answers_is_refused(refused: Callable[..., str], words: list
 def test_explain_says_who_gives_the_value(refused: Callable[..., str]) -> None:
     sentence = refused("explain", PAPER, "-p", AVERAGE)
     assert "cannot be explained" in sentence
-    assert sentence.endswith("ratherthan solve can give its value.")
+    assert sentence.endswith("ratherthan solve can ask Storm for its value.")
 
 
 def test_without_storm_the_reason_stays_and_the_extra_is_named(
@@ -148,4 +148,4 @@ def test_what_takes_too_much_memory_is_left_to_storm(
     assert 0.98 < told["value"] < 1
     sentence = refused("explain", PAPER, "-p", "trip.props:soon")
     assert "at most 10 branches" in sentence
-    assert sentence.endswith("ratherthan solve can give its value.")
+    assert sentence.endswith("ratherthan solve can ask Storm for its value.")

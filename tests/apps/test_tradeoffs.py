@@ -164,6 +164,48 @@ def test_a_discounted_objective_is_traded_for_the_others_discounted_alike(docume
     assert len(found["plans"]) == 3
 
 
+def test_of_the_weights_only_what_is_proved_is_said(said):
+    lines = said(*PEDESTRIANS, "--most", "2").splitlines()
+    assert [line.split(maxsplit=3)[3] for line in lines[1:3]] == ["W = 0", "least risk alone"]
+    steps = said(
+        "tradeoffs", "example:pedestrians", "-p", "safest", "--also", 'Tmin=? [F "destination"]', "--most", "2"
+    )
+    assert "fewest steps alone" in steps
+    assert "inf" not in steps
+
+
+def test_a_plan_that_is_best_in_everything_is_found_on_a_map_where_both_ends_are_beaten(said, tmp_path):
+    rows = ("S = . .", ". . . w", ". . . D")
+    text = """property = 'R{"distance"}min=? [F "destination"]'
+map = '''
+%s
+'''
+[kinds]
+w = "puddle"
+[costs]
+distance = {other = 1, highway = 3}
+risk = {other = 0, puddle = 1}
+"""
+    (tmp_path / "map.roadmap").write_text(text % "\n".join(rows))
+    lines = said("tradeoffs", tmp_path / "map.roadmap").splitlines()
+    assert lines[1].split() == ["1", "5", "0", "every", "W"]
+    assert lines[-1] == "Plan 1 is best in every objective: there is nothing to trade."
+
+
+def test_the_discount_is_for_all_that_is_wanted(said, document, refused):
+    distance, risk = 'R{"distance"}min=? [C]', 'R{"risk"}max=? [C]'
+    source = ("example:pedestrians", "--discount", "0.9")
+    found = document("tradeoffs", *source, "-p", distance, "--also", risk)
+    assert [entry["property"] for entry in found["objectives"]] == [
+        text.replace("[C]", "[Cdiscount=0.9]") for text in (distance, risk)
+    ]
+    assert "discounted risk" in said("explain", *source, "-p", distance, "--also", risk)
+    assert "discounted risk" in said("explain", *source, "-p", "shortest", "--also", risk)
+    for words in (("solve",), ("explain",), ("factors",), ("explain", "--also", "risk"), ("tradeoffs",)):
+        assert "sum without end" in refused(words[0], *source, "-p", "shortest", *words[1:])
+    assert "ratherthan solve" not in refused("explain", "example:pedestrians", "-p", "shortest", "--also", risk)
+
+
 def test_when_more_plans_are_left_out_it_is_said(said):
     assert said(*PEDESTRIANS, "--most", "2").endswith(
         "2 less risk costs 7.5 more distance: plan 2 rather than plan 1; they part at grid 24: move north rather than east. "

@@ -129,7 +129,7 @@ def test_hazards_in_the_way_are_named() -> None:
     }
     explanation = explain(solve(problem_of(table, OBJECTIVES["safest"], goals=[2], hazards=[1])))
     assert explanation.in_the_way == (1,)
-    assert narrate(explanation) == "There is no way to arrive from state 0: state 1 in between must be avoided."
+    assert narrate(explanation) == "There is no way to arrive safely from state 0: state 1 in between must be avoided."
 
 
 def test_at_the_goal_we_are_already_there() -> None:

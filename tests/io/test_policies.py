@@ -189,7 +189,7 @@ def test_a_q_table_agrees_with_the_plainest_loop(values, minimise):
         best = (min if minimise else max)((values[choice] for choice in allowed), default=None)
         expected.append(next((choice for choice in allowed if values[choice] == best), -1))
     if expected == [-1, -1, -1]:
-        assert "must have a number for some enabled action" in refusal(q, mdp, minimise_q=minimise)
+        assert "must have a finite number for some enabled action" in refusal(q, mdp, minimise_q=minimise)
     else:
         assert read_policy(q, mdp, minimise_q=minimise).choice.tolist() == expected
 
@@ -301,7 +301,8 @@ def test_a_broken_file_is_one_sentence_with_its_name(file, mdp, name, text, word
         (np.array([3, 0, 0]), ["0 … 2", "3"]),
         (np.array([-2, 0, 0]), ["-2"]),
         (np.array([2**64 - 1, 0, 0], dtype=np.uint64), ["18446744073709551615"]),
-        (np.full((3, 3), np.nan), ["NaN or -inf", "columns"]),
+        (np.full((3, 3), np.nan), ["all of them are NaN, -inf or inf", "columns"]),
+        (np.full((3, 3), np.inf), ["must have a finite number", "columns"]),
     ],
 )
 def test_an_array_that_does_not_fit_is_told(array, words):

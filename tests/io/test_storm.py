@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 from random_models import OBJECTIVES, random_problem
 
-from ratherthan.errors import MissingExtraError, PropertyError, QuestionError
+from ratherthan.errors import MissingExtraError, PropertyError, QuestionError, SourceError
 from ratherthan.io._storm_text import translated
 from ratherthan.io._storm_words import outer_filter
 from ratherthan.io.arrays import from_arrays
 from ratherthan.io.jani import read_jani
-from ratherthan.io.storm import ask_storm, storm_is_there
+from ratherthan.io.storm import _patience, ask_storm, storm_is_there
 from ratherthan.model.mdp import Reward
 from ratherthan.model.names import StateNames
 from ratherthan.model.problem import Problem
@@ -158,7 +158,7 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Storm works in this process, which takes less time than one of its own."""
     from ratherthan.io._storm_answer import answer
 
-    def run(folder: Path) -> int:
+    def run(folder: Path, patience: float) -> int:
         answer(folder)
         return 0
 
@@ -334,6 +334,51 @@ def test_storm_can_be_interrupted(walk: Problem, interrupted: float) -> None:
     with pytest.raises(KeyboardInterrupt):
         ask_storm(walk, 'Pmax=? [F{"fuel used"}<=1000000000 far]')
     assert time.monotonic() - interrupted < 8
+
+
+@pytest.fixture
+def ring() -> Problem:
+    """0 → 1 or 2, 1 → 0 or 1, 2 → 0: two fifths of the time in 0 and in 1; of both signs and only losses."""
+    return from_arrays(
+        state_to_choices=np.array([0, 1, 2, 3]),
+        choice_to_branches=np.array([0, 2, 4, 5]),
+        branch_to_target=np.array([1, 2, 0, 1, 0]),
+        branch_to_probability=np.array([0.5, 0.5, 0.5, 0.5, 1.0]),
+        rewards={
+            "gain": Reward(choice=np.array([-1.0, 2.0, -3.0])),
+            "even": Reward(choice=np.array([0.0, -1.0, 0.0]), state=np.array([1.0, 0.0, 0.0])),
+            "loss": Reward(branch=np.array([-1.0, -3.0, -4.0, -6.0, 0.0])),
+        },
+        initial=[0],
+    )
+
+
+@needs_storm
+@pytest.mark.parametrize(("reward", "mean"), [("gain", -0.2), ("even", 0.0), ("loss", -2.8)])
+def test_the_mean_of_a_reward_that_may_be_negative_comes_out(ring: Problem, reward: str, mean: float) -> None:
+    for text in (f'R{{"{reward}"}}=? [LRA]', f'R{{"{reward}"}}=? [S]', f'filter(max, R{{"{reward}"}}=? [LRA])'):
+        answer = ask_storm(ring, text)
+        assert answer.value == pytest.approx(mean, abs=1e-5)
+        assert answer.lower is None or answer.lower <= mean <= answer.upper
+
+
+@needs_storm
+def test_what_storm_refines_for_ever_is_given_up_with_a_sentence(
+    ring: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ratherthan.io.storm._PATIENCE_FOR_MEANS", 1.5)
+    began = time.monotonic()
+    with pytest.raises(SourceError, match="after 1.5 seconds it has none: the mean in the long run"):
+        ask_storm(ring, 'R{"gain"}>=0 [LRA]')
+    assert time.monotonic() - began < 8
+
+
+@pytest.mark.parametrize(("text", "patient"), [("LRA", False), ("S", False), ("C<=4", True), ("I=0", True)])
+def test_patience_is_short_where_the_mean_of_what_may_be_negative_is_asked_for(
+    walk: Problem, text: str, patient: bool
+) -> None:
+    assert (_patience(translated(f'R{{"mood"}}max=? [{text}]', walk)) > 60) == patient
+    assert _patience(translated(f'R{{"fuel used"}}max=? [{text}]', walk)) > 60
 
 
 # -- what others published ------------------------------------------------------------------------------------------------

@@ -255,3 +255,14 @@ def test_compiled_and_plain_number_alike(monkeypatch: pytest.MonkeyPatch) -> Non
         assert (getattr(made[0].mdp, name) == getattr(made[1].mdp, name)).all()
     assert (unfolding_of(made[0]).state == unfolding_of(made[1]).state).all()
     assert (unfolding_of(made[0]).memory == unfolding_of(made[1]).memory).all()
+
+
+def test_what_is_said_behind_a_name_has_an_end_and_tells_the_memories_apart() -> None:
+    formula = '"goal"'
+    for _ in range(40):
+        formula = f'"spot" & (X (F ({formula})))'
+    problem = unfolded(random_model(Random(3), most_states=4), Mission(formula=f"F ({formula})"))
+    names = [problem.mdp.names[state] for state in range(problem.mdp.states)]
+    assert len(set(names)) == len(names)
+    assert max(map(len, names)) < 150
+    assert any(" …" in name for name in names)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from random import Random
 from typing import Any
 
@@ -15,9 +16,18 @@ from lasso import property_of, random_path
 from ratherthan.errors import NotExplainableError, PropertyError
 from ratherthan.model.mdp import MDP, Reward
 from ratherthan.model.names import StateNames
-from ratherthan.model.objective import ExpectedCost, Lexicographic, Mission, Objective, ReachAvoid, Threshold
+from ratherthan.model.objective import (
+    Discounted,
+    ExpectedCost,
+    ExpectedReward,
+    Lexicographic,
+    Mission,
+    Objective,
+    ReachAvoid,
+    Threshold,
+)
 from ratherthan.model.problem import Problem
-from ratherthan.model.property import choose_objective, parse_property
+from ratherthan.model.property import choose_objective, parse_property, wish_of
 
 COST = Reward(choice=np.ones(5))
 
@@ -170,6 +180,69 @@ def test_of_several_properties_only_the_first_may_need_memory() -> None:
         parse_property(f"{cost} then {steps}", PROBLEM)
 
 
+LEAST, ARRIVE = 'R{"cost"}min=? [F "goal"]', 'Pmax=? [F "goal"]'
+SUM = 'R{"cost"}max=? [C]'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "least then surest",
+        '"least" then "surest"',
+        f"{LEAST} then surest",
+        f"least then {ARRIVE}",
+        "least\tthen\n surest",
+        "least then arrival",
+    ],
+)
+def test_names_of_the_source_can_stand_between_then(text: str) -> None:
+    named = replace(
+        PROBLEM,
+        properties={name: parse_property(said, PROBLEM) for name, said in (("least", LEAST), ("surest", ARRIVE))},
+        others={"arrival": ARRIVE},
+    )
+    assert choose_objective(named, text) == parse_property(f"{LEAST} then {ARRIVE}", PROBLEM)
+
+
+def test_a_name_with_then_in_it_is_one_name() -> None:
+    wanted = parse_property(LEAST, PROBLEM)
+    named = replace(PROBLEM, properties={"now then later": wanted, "now": parse_property(ARRIVE, PROBLEM)})
+    assert choose_objective(named, "now then later") == wanted
+    with pytest.raises(PropertyError, match="'now then later', 'now'; got 'later'"):
+        choose_objective(named, "now then later then later")
+
+
+def test_a_discount_beside_several_properties_is_for_those_without_end() -> None:
+    total = Discounted(reward="cost", discount=0.9, maximise=True)
+    read = parse_property(f"{SUM} then {ARRIVE}", PROBLEM, discount=0.9)
+    assert read == Lexicographic(levels=(total, ReachAvoid(goal=GOAL)))
+    for text in (SUM, LEAST):  # beside another wish it is no matter whether a wish needs it
+        assert wish_of(PROBLEM, text, discount=0.9) == parse_property(
+            text, PROBLEM, discount=0.9 if text == SUM else None
+        )
+
+
+@pytest.mark.parametrize("text", [LEAST, ARRIVE, f"{LEAST} then {ARRIVE}", "least", "discounted"])
+def test_a_discount_that_nothing_takes_is_refused(text: str) -> None:
+    discounted = Discounted(reward="cost", discount=0.5, maximise=True)
+    named = replace(PROBLEM, properties={"least": parse_property(LEAST, PROBLEM), "discounted": discounted})
+    with pytest.raises(PropertyError, match=r"sum without end.*the discount 0\.9"):
+        choose_objective(named, text, discount=0.9)
+
+
+@pytest.mark.parametrize("asked", ["C", "C<=5", "I=3", "S"])
+def test_the_nearest_that_can_be_explained_is_about_the_same_reward_and_can_be_read(asked: str) -> None:
+    gain = {"gain": Reward(choice=np.resize([-1.0, 1.0], PROBLEM.mdp.choices))}
+    signed = replace(PROBLEM, mdp=replace(PROBLEM.mdp, rewards={**PROBLEM.mdp.rewards, **gain}))
+    for way in ("min", "max"):
+        with pytest.raises(NotExplainableError) as caught:
+            parse_property(f'R{{"gain"}}{way}=? [{asked}]', signed)
+        assert '"cost"' not in caught.value.message
+        nearest = re.findall(r'R\{"gain"\}\w+=\? \[.*?\]', caught.value.message)
+        assert [parse_property(text, signed).text for text in nearest] == nearest
+        assert ExpectedReward(goal=GOAL, reward="gain", maximise=way == "max").text in nearest
+
+
 @pytest.mark.parametrize(
     ("text", "maximise", "relation", "bound"),
     [
@@ -215,12 +288,17 @@ def test_without_decisions_min_and_max_need_not_be_said() -> None:
             "F with a bound on a reward",
             'Pmax=? [F (busy & (F<=3 "goal"))]',
         ),
-        ('R{"cost"}max=? [Csteps<=200]', "C with a bound", "[F "),
-        ('R{"cost"}max=? [C<=200]', "C with a bound", "[F "),
-        ('R{"cost"}max=? [C]', "C (a reward that adds up without end)", "[F "),
-        ('R{"cost"}max=? [I=3]', "I (the reward at one instant)", "[F "),
-        ('R{"cost"}max=? [S]', "A long-run average", "[F "),
-        ('R{"cost"}max=? [LRA]', "A long-run average", "[F "),
+        ('R{"cost"}max=? [Csteps<=200]', "C with a bound", 'R{"cost"}max=? [Fsure "goal"]'),
+        ('R{"cost"}max=? [C<=200]', "C with a bound", 'R{"cost"}max=? [Fsure "goal"]'),
+        (
+            'R{"cost"}max=? [C]',
+            "C (a reward that adds up without end)",
+            'R{"cost"}max=? [Cdiscount=0.95], or the reward until a goal, R{"cost"}max=? [Fsure "goal"].',
+        ),
+        ('R{"cost"}min=? [C]', "C (a reward that adds up without end)", 'R{"cost"}min=? [F "goal"].'),
+        ('R{"cost"}max=? [I=3]', "I (the reward at one instant)", 'R{"cost"}max=? [Fsure "goal"]'),
+        ('R{"cost"}max=? [S]', "A long-run average", 'R{"cost"}max=? [Fsure "goal"]'),
+        ('R{"cost"}max=? [LRA]', "A long-run average", 'R{"cost"}max=? [Fsure "goal"]'),
         ("S=? [busy]", "A long-run average", "[F "),
         ('LRAmax=? ["goal"]', "A long-run average", "[F "),
         ('Pmax=? [G !"h"]', "G (always)", 'Pmin=? [F "h"]'),

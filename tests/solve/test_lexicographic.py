@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from math import inf
+from random import Random
 
 import numpy as np
 import pytest
-from random_models import GOAL, HAZARD, Table, problem_of
+from random_models import GOAL, HAZARD, Table, problem_of, random_problem
 
 from ratherthan.errors import PropertyError
 from ratherthan.model.objective import (
     Discounted,
     ExpectedCost,
     ExpectedReward,
+    Level,
     Lexicographic,
     Mission,
     ReachAvoid,
+    levels_of,
 )
 from ratherthan.model.policy import Policy
+from ratherthan.model.property import parse_property
 from ratherthan.solve import Outcome, evaluate, solve
 from ratherthan.solve.levels import ended_at
 
@@ -198,3 +203,101 @@ def test_progress_tells_which_objective_is_solved() -> None:
     told: list[str] = []
     solve(problem_of(FORK, both(SAFEST, CHEAPEST), goals=[3], hazards=[4]), progress=told.append)
     assert "objective 2 of 2" in told
+
+
+WET: Table = {
+    0: {"wait": ([(1.0, 0)], 0), "through": ([(1.0, 1)], 1), "past": ([(0.75, 2), (0.25, 1)], 5)},
+    1: {"on": ([(1.0, 2)], 1)},
+    2: {"stay": ([(1.0, 2)], 0)},
+}
+
+
+@pytest.mark.parametrize("first", [LIKELIEST, CHEAPEST], ids=["likeliest", "cheapest"])
+def test_to_stay_for_ever_is_no_way_to_avoid_what_lies_on_the_only_way(first: Level) -> None:
+    """Who never arrives keeps dry; but the first level demands that he arrives."""
+    dry = ReachAvoid(goal=HAZARD, maximise=False)
+    solution = solve(problem_of(WET, both(first, dry), goals=[2], hazards=[1]))
+    assert solution.outcome is Outcome.CERTIFIED
+    assert solution.values[1].tolist() == pytest.approx([0.25 if first is LIKELIEST else 1, 1, 0])
+    assert np.allclose(solution.policy_values, solution.values)
+    narrow = {**WET, 0: {"wait": ([(1.0, 0)], 0), "through": ([(1.0, 1)], 1)}}
+    solution = solve(problem_of(narrow, both(first, dry), goals=[2], hazards=[1]))
+    assert solution.values[1].tolist() == [1, 1, 0], "every way there is wet"
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_least_risk_on_the_way_is_that_of_the_best_plan_that_attains_the_first_level(seed: int) -> None:
+    problem = random_problem(Random(seed), most_states=5, objective=LIKELIEST)
+    levels = (LIKELIEST, ReachAvoid(goal=HAZARD, maximise=False))
+    solution = solve(problem, both(*levels))
+    best = solution.values[0]
+    risks = []
+    for choice in product(*map(problem.mdp.choices_of, range(problem.mdp.states))):
+        found = evaluate(problem, Policy(choice=np.array(choice)), both(*levels))
+        if np.allclose(found.policy_values[0], best, rtol=0, atol=1e-9):
+            risks.append(found.policy_values[1])
+    assert np.allclose(np.min(risks, axis=0), solution.values[1], rtol=0, atol=1e-9)
+    assert np.allclose(solution.policy_values, solution.values, rtol=0, atol=1e-9)
+
+
+def test_a_discounted_sum_that_is_best_for_ever_is_refused_after_a_level_that_ends() -> None:
+    table: Table = {
+        0: {"graze": ([(1.0, 0)], 1), "home": ([(1.0, 1)], 0)},
+        1: {"stay": ([(1.0, 1)], 0)},
+    }
+    problem = problem_of(table, LIKELIEST, goals=[1])
+    most, least = (Discounted(reward="cost", discount=0.5, maximise=m) for m in (True, False))
+    with pytest.raises(PropertyError, match="a plan that is best for it and for those before it"):
+        solve(problem, both(LIKELIEST, most))
+    assert solve(problem, both(LIKELIEST, least)).policy.choice[0] == 1
+    assert solve(problem, both(most, LIKELIEST)).values[:, 0].tolist() == [2, 0], "first it has its value"
+
+
+def test_a_largest_cost_without_end_is_refused_before_and_after_a_level_that_ends() -> None:
+    table: Table = {
+        0: {"wait": ([(1.0, 0)], 1), "go": ([(1.0, 1)], 1)},
+        1: {"back": ([(1.0, 0)], 1), "try": ([(0.5, 2), (0.5, 0)], 0)},
+        2: {"stay": ([(1.0, 2)], 0)},
+    }
+    dearest = ExpectedCost(goal=GOAL, reward="cost", maximise=True)
+    problem = problem_of(table, LIKELIEST, goals=[2])
+    with pytest.raises(PropertyError, match="only the last may be without a finite value.*state 0"):
+        solve(problem, both(dearest, LIKELIEST))
+    with pytest.raises(PropertyError, match="a plan that is best for it"):
+        solve(problem, both(LIKELIEST, dearest))
+    free = {**table, 0: {"wait": ([(1.0, 0)], 0), "go": ([(1.0, 1)], 3)}, 1: {"on": ([(1.0, 2)], 1)}}
+    solution = solve(problem_of(free, both(LIKELIEST, dearest), goals=[2]))
+    assert solution.values[1].tolist() == [4, 1, 0], "to wait for ever costs nothing, and does not arrive"
+    assert np.allclose(solution.policy_values, solution.values)
+
+
+def test_where_no_plan_without_memory_has_both_the_first_level_is_kept_to_near_the_end_only() -> None:
+    """To see the hazard first and then arrive takes memory at 0; elsewhere both can be had."""
+    table: Table = {
+        0: {"away": ([(1.0, 2)], 0), "arrive": ([(1.0, 1)], 0)},
+        1: {"stay": ([(1.0, 1)], 0)},
+        2: {"back": ([(1.0, 0)], 0), "see": ([(1.0, 3)], 0)},
+        3: {"back": ([(1.0, 0)], 0)},
+    }
+    solution = solve(problem_of(table, both(LIKELIEST, ReachAvoid(goal=HAZARD)), goals=[1], hazards=[3]))
+    assert solution.policy_values.tolist() == [[1, 1, 1, 1], [0, 0, 1, 1]]
+
+
+def test_an_objective_without_levels_is_refused() -> None:
+    with pytest.raises(PropertyError, match="at least one"):
+        solve(problem_of(WET, LIKELIEST, goals=[2], hazards=[1]), both())
+
+
+def test_a_solution_tells_its_objectives_in_their_one_spelling() -> None:
+    problem = problem_of(WET, LIKELIEST, goals=[2], hazards=[1])
+    for given, plain in (
+        (ReachAvoid(goal=f"({GOAL})", through=f"!({HAZARD})"), SAFEST),
+        (ExpectedCost(goal=f"(({GOAL}))", reward="2*cost"), ExpectedCost(goal=GOAL, reward="2 * cost")),
+        (Mission(formula=f"F<=2   ({GOAL})"), MISSION),
+        (both(Mission(formula=f"F<=2 ({GOAL})"), CHEAPEST), both(MISSION, CHEAPEST)),
+    ):
+        wanted = levels_of(plain)
+        assert solve(problem, given).objectives == wanted
+        policy = Policy(choice=np.array([1, 3, 4]))
+        assert evaluate(problem, policy, given).objectives == wanted
+        assert parse_property(plain.text, problem) == plain

@@ -22,6 +22,7 @@ from ratherthan.model.objective import Discounted, ExpectedCost, ExpectedReward,
 from ratherthan.model.problem import Problem
 from ratherthan.solve.frequencies import frequencies, mixed
 from ratherthan.solve.pareto import Tradeoffs, tradeoffs
+from ratherthan.solve.weighing import Weighing
 
 GOAL = '"goal"'
 COST, RISK = ExpectedCost(goal=GOAL, reward="cost"), ExpectedCost(goal=GOAL, reward="risk")
@@ -115,6 +116,55 @@ def test_a_ladder_of_n_rungs_has_n_plus_one_plans():
         whole = next(other for other in found.plans if other.values.tolist() == plan.values.tolist())
         assert whole.weights[1][0] <= plan.weights[1][0] * (1 + 1e-9)
         assert plan.weights[1][1] <= whole.weights[1][1] * (1 + 1e-9)
+
+
+def crossing(pay: float) -> Problem:
+    """Return a model where paying once or taking a risk are best for one each, unless the third way is free of both."""
+    table = {
+        0: {"dare": ([(1.0, 1)], 0), "pay": ([(1.0, 1)], pay), "round": ([(1.0, 1)], 0)},
+        1: {"on": ([(1.0, 2)], 5)},
+        2: {"stay": ([(1.0, 2)], 0)},
+    }
+    problem = problem_of(table, COST, goals=[2])
+    risk = Reward(choice=np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
+    return replace(problem, mdp=replace(problem.mdp, rewards={**problem.mdp.rewards, "risk": risk}))
+
+
+@pytest.mark.parametrize("discount", [None, 0.9])
+def test_a_plan_that_beats_both_ends_is_the_only_one(discount):
+    wishes = [COST, RISK]
+    if discount is not None:
+        wishes = [Discounted(reward=name, discount=discount, maximise=False) for name in ("cost", "risk")]
+    found = tradeoffs(crossing(2.0), wishes, bound={"risk": 0.5})
+    assert (len(found.plans), found.trades, found.complete) == (1, (), True)
+    assert found.plans[0].values == pytest.approx([5 * (discount or 1.0), 0.0])
+    assert found.plans[0].weights[1] == (0.0, math.inf)
+    assert found.bounded.plan.values == pytest.approx(found.plans[0].values)
+
+
+def test_an_end_that_is_beaten_makes_way_whichever_of_several_best_plans_is_found(monkeypatch):
+    """Of several plans that are best for one cost alone, the solver may return the worst for the other."""
+    weigh = Weighing.best
+    for problem in models(60):
+        exact = corners(attained(problem))
+
+        def unlucky(weighing, weights, problem=problem):
+            found = weigh(weighing, weights)
+            if found is None or np.count_nonzero(weights) == 2:
+                return found
+            free = int(np.flatnonzero(weights == 0)[0])
+            ways = [list(problem.mdp.choices_of(s)) for s in range(problem.mdp.states)]
+            tied = [weighing.followed(rt.Policy(choice=np.array(way))) for way in itertools.product(*ways)]
+            own = found.costs[1 - free]
+            tied = [plan for plan in tied if plan and abs(plan.costs[1 - free] - own) <= 1e-12 * abs(own)]
+            return replace(max(tied, key=lambda plan: plan.costs[free]), least=found.least)
+
+        monkeypatch.setattr(Weighing, "best", unlucky)
+        found = tradeoffs(problem, [COST, RISK])
+        assert found.complete
+        assert np.array(values_of(found)).ravel() == pytest.approx(np.array(exact, dtype=float).ravel(), abs=1e-9)
+        ranges = [plan.weights[1] for plan in found.plans]
+        assert not ranges or (ranges[0][0], ranges[-1][1]) == (0.0, math.inf)
 
 
 def test_each_plan_is_best_for_its_weights_and_the_weights_leave_no_gap():
@@ -424,12 +474,38 @@ def test_what_cannot_be_traded_is_refused(wishes, error, said):
     [
         ({"rsik": 1.0}, "cost, risk, got 'rsik'"),
         ({"risk": math.nan}, "finite number"),
+        ({"risk": "1"}, "finite number"),
+        ({"risk": None}, "finite number"),
+        ({"risk": True}, "finite number"),
+        ({"risk": 10**400}, "finite number"),
+        (0.5, "name of a reward with a number"),
         ({"risk": 1.0, "cost": 2.0}, "one objective can be bounded"),
     ],
 )
 def test_a_bound_that_means_nothing_is_refused(bound, said):
     with pytest.raises(QuestionError, match=said.capitalize() if said[0] == "o" else said):
         tradeoffs(two_rewards(Random(1)), [COST, RISK], bound=bound)
+
+
+@pytest.mark.parametrize(
+    "wishes", [5, "safest", ["shortest", None], ["shortest", 'P>=0.5 [F "crowd"]'], ["shortest", 5]]
+)
+def test_what_is_no_objective_is_refused_in_a_sentence(wishes):
+    with pytest.raises(QuestionError, match="must be between"):
+        tradeoffs(rt.read("example:pedestrians"), wishes)
+
+
+@pytest.mark.parametrize("most", [1, "3", 2.5])
+def test_how_many_plans_are_wanted_is_a_whole_number_from_two_on(most):
+    with pytest.raises(QuestionError, match="At least two plans"):
+        tradeoffs(rt.read("example:pedestrians"), ["shortest", "safest"], most=most)
+
+
+def test_objectives_can_be_given_as_texts_and_names():
+    problem = rt.read("example:pedestrians")
+    known = values_of(tradeoffs(problem, [problem.properties["shortest"], problem.properties["safest"]]))
+    for wishes in (["shortest", "risk"], ['R{"distance"}min=? [F "destination"]', problem.properties["safest"]]):
+        assert values_of(tradeoffs(problem, wishes)) == known
 
 
 def by_storm(problem: Problem, folder, goal: str, names: tuple[str, str], bound: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from fractions import Fraction
 from random import Random
 
@@ -14,7 +15,7 @@ from random_models import LEVELS, Table, problem_of, random_rich_problem
 
 from ratherthan.explain.question import question
 from ratherthan.model.mdp import Reward
-from ratherthan.model.objective import ExpectedCost, Lexicographic, ReachAvoid, levels_of
+from ratherthan.model.objective import Discounted, ExpectedCost, Lexicographic, Objective, ReachAvoid, levels_of
 from ratherthan.model.problem import Problem
 from ratherthan.verify.candidates import Budget
 from ratherthan.verify.levels import Levels, levels_on
@@ -150,3 +151,69 @@ def test_waiting_is_tied_but_does_not_arrive() -> None:
         band = levels_of_problem(problem, budget).best[1]
         assert band[0].lower == pytest.approx(4)
         assert band[0].upper == pytest.approx(4)
+
+
+ARRIVE = ReachAvoid(goal='"goal"')
+
+
+def puddle(second: Objective, risk: float) -> Problem:
+    """Waiting keeps the chance to arrive and keeps dry, "go" arrives; "jump" as well, but through the puddle, state 2."""
+    table: Table = {
+        0: {"wait": ([(1.0, 0)], 1.0), "go": ([(risk, 2), (1.0 - risk, 1)], 4.0), "jump": ([(1.0, 2)], 0.0)},
+        1: {"stay": ([(1.0, 1)], 0.0)},
+        2: {"on": ([(1.0, 1)], 0.0)},
+    }
+    return problem_of(table, Lexicographic(levels=(ARRIVE, second)), goals=[1], hazards=[2])
+
+
+@pytest.mark.parametrize("budget", [EXACT, SWEPT], ids=["exact", "swept"])
+@pytest.mark.parametrize("risk", [0.25, 1e-6])
+def test_who_never_arrives_does_not_keep_off_the_risk_of_the_way(risk: float, budget: Budget) -> None:
+    band = levels_of_problem(puddle(ReachAvoid(goal='"hazard"', maximise=False), risk), budget).best[1]
+    assert band[0].lower <= risk <= band[0].upper
+    assert band[0].upper - band[0].lower <= 1e-9 * risk
+    assert band[1].lower == band[1].upper == 0.0
+
+
+@pytest.mark.parametrize("budget", [EXACT, SWEPT], ids=["exact", "swept"])
+def test_the_largest_chance_of_a_second_level_is_attained_on_the_way(budget: Budget) -> None:
+    band = levels_of_problem(puddle(ReachAvoid(goal='"hazard"'), 0.25), budget).best[1]
+    assert band[0].lower == pytest.approx(1.0)
+    assert band[0].upper == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("budget", [EXACT, SWEPT], ids=["exact", "swept"])
+def test_what_is_the_better_the_longer_one_puts_off_the_goal_is_never_confirmed(budget: Budget) -> None:
+    """Waiting for ever would give 1 / (1 - 0.75) = 4 and a great cost; who arrives has less, as near as he likes."""
+    put_off = puddle(Discounted(reward="cost", discount=0.75), 0.25)
+    levels = levels_of_problem(put_off, budget)
+    assert levels.best[1][0].upper >= 4.0
+    at_once = levels_of_problem(puddle(Discounted(reward="cost", discount=0.75, maximise=False), 0.25), budget)
+    assert at_once.best[1][0].lower == pytest.approx(0.0)
+    assert at_once.best[1][0].upper == pytest.approx(0.0, abs=1e-9)  # to jump costs nothing
+
+    lazy = replace(levels, weight=np.array([1.0, 0, 0, 1, 1]))
+    assert lazy.followed[0][0].upper == 0.0  # it never arrives
+    table: Table = {
+        0: {"wait": ([(1.0, 0)], 1.0), "go": ([(1.0, 1)], 0.0)},
+        1: {"stay": ([(1.0, 1)], 0.0)},
+    }
+    second = Discounted(reward="cost", discount=0.75)
+    problem = problem_of(table, Lexicographic(levels=(ARRIVE, second)), goals=[1])
+    band = levels_of_problem(problem, budget).best[1]
+    assert (band[0].lower, band[0].upper) == (-math.inf, pytest.approx(4.0))
+
+
+def test_what_is_infinitely_much_at_the_first_level_leaves_the_second_open() -> None:
+    """Who goes round pays for ever; which of those who do pays the least toll in the puddle is not told by tied choices."""
+    table: Table = {
+        0: {"round": ([(1.0, 0)], 1.0), "wade": ([(1.0, 2)], 1.0), "on": ([(1.0, 1)], 1.0)},
+        1: {"stay": ([(1.0, 1)], 0.0)},
+        2: {"back": ([(1.0, 0)], 1.0)},
+    }
+    for second in (ReachAvoid(goal='"hazard"', maximise=False), ExpectedCost(goal='"hazard"', reward="cost")):
+        first = ExpectedCost(goal='"goal"', reward="cost", maximise=True)
+        problem = problem_of(table, Lexicographic(levels=(first, second)), goals=[1], hazards=[2])
+        bands = levels_of_problem(problem, EXACT).best
+        assert bands[0][0].lower == math.inf
+        assert (bands[1][0].lower, bands[1][0].upper) == (-math.inf, math.inf)

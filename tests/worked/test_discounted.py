@@ -22,11 +22,11 @@ MODEL = {
 MOST = Discounted(reward="cost", discount=0.5)
 LEAST = Discounted(reward="cost", discount=0.5, maximise=False)
 TEXTS = {
-    "naive-path": "First, we take walk at field. Finally, we take dig at mine. Most likely, this route then comes back to field.",
+    "naive-path": "First, we take walk at field. Finally, we take dig at mine. This route then comes back to field.",
     "contrastive": (
         "First, we take walk at critical field because it leads to the plan with the largest discounted cost and the most "
         "flexible future route. Finally, we take dig at critical mine because it leads to the plan with the largest discounted cost. "
-        "Most likely, this route then comes back to field."
+        "This route then comes back to field."
     ),
     "responsibility at mine": "We take dig at mine because it leads to the plan with the largest discounted cost.",
     "constrictive at mine": "We take dig at mine, which leaves the same choices open as every other action.",

@@ -164,7 +164,7 @@ def test_where_the_plan_never_comes_there_is_no_end(small, explained):
     problem = small(table, objective=SHORT, labels={"home": ["home"]})
     text = explained(problem, also=['R{"risk"}min=? [F "home"]'])
     assert text.endswith(
-        "On this plan we expect a distance of 3. No total can be given for the risk: it counts until a goal that this plan may not reach."
+        "On this plan we expect a distance of 3. No total can be given for the risk: it counts until home is reached, and this plan may not get there."
     )
 
 

@@ -5,7 +5,7 @@ What every command does first, in an order in which a slip of the person is told
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +46,7 @@ def answer_of(wanted: Wanted, *, policy: str | None, minimise_q: bool) -> tuple[
     from ratherthan.apps.answers import value_document
     from ratherthan.apps.elsewhere import asked_of_storm, storm_document
     from ratherthan.errors import NotExplainableError, PropertyError
+    from ratherthan.model.discounts import discount_taken
     from ratherthan.model.objective import Lexicographic, Threshold
     from ratherthan.model.states import start_of
 
@@ -54,6 +55,7 @@ def answer_of(wanted: Wanted, *, policy: str | None, minimise_q: bool) -> tuple[
     reason: PropertyError
     try:
         wish = _wish(wanted, problem)
+        discount_taken([wish], wanted.discount)
     except PropertyError as error:
         reason = error
     else:
@@ -73,14 +75,14 @@ def explanation_of(wanted: Wanted, given: Mapping[str, Any]) -> Explanation:
     from ratherthan.explain import explain
     from ratherthan.model.states import start_of, state_number
 
-    problem = _explainable(wanted)
+    problem, also = _explainable(wanted, given["also"])
     state = given["state"]
     if state is None:
         start_of(problem.mdp)
     asked = _question(given, None if state is None else state_number(problem.mdp, state))
     solution = _solved(problem, given["policy"], minimise_q=given["minimise_q"])
     with waiting("Explaining"):
-        return explain(solution, asked=asked, also=given["also"])
+        return explain(solution, asked=asked, also=also)
 
 
 def factor_table_of(wanted: Wanted, given: Mapping[str, Any]) -> dict[str, Column]:
@@ -89,7 +91,7 @@ def factor_table_of(wanted: Wanted, given: Mapping[str, Any]) -> dict[str, Colum
     from ratherthan.explain import Factors
     from ratherthan.model.states import start_of, state_number
 
-    problem = _explainable(wanted)
+    problem, _ = _explainable(wanted)
     asked, start = _question(given, None), start_of(problem.mdp)
     states = {state_number(problem.mdp, state) for state in given["states"]}
     solution = _solved(problem, given["policy"], minimise_q=given["minimise_q"])
@@ -101,21 +103,47 @@ def factor_table_of(wanted: Wanted, given: Mapping[str, Any]) -> dict[str, Colum
 
 def _wish(wanted: Wanted, problem: Problem) -> Objective | Threshold:
     """Return what is wanted: the property that was given, else the one that the source makes plain."""
-    from ratherthan.model.property import choose_objective, lexicographic
+    from ratherthan.model.property import lexicographic, wish_of
 
-    wishes = [choose_objective(problem, text, discount=wanted.discount) for text in wanted.properties or (None,)]
+    wishes = [wish_of(problem, text, discount=wanted.discount) for text in wanted.properties or (None,)]
     return wishes[0] if len(wishes) == 1 else lexicographic(wishes)
 
 
-def _explainable(wanted: Wanted) -> Problem:
-    """Return the problem with an objective that has a best value, unfolded with what must be remembered for it."""
+def _further(wanted: Wanted, problem: Problem, wish: Objective | Threshold, also: Sequence[str]) -> list[Objective]:
+    """Return what else is wanted; the discount is for this, too."""
+    from ratherthan.errors import PropertyError
+    from ratherthan.model.discounts import discount_taken
+    from ratherthan.model.further import further_objective
+    from ratherthan.model.objective import Threshold, levels_of
+
+    levels = levels_of(wish.objective if isinstance(wish, Threshold) else wish)
+    wishes: list[Objective] = []
+    for text in also:
+        further = further_objective(problem, text, levels, discount=wanted.discount)
+        if isinstance(further, Threshold):
+            raise PropertyError(
+                f"A further objective must ask for one best value (=?), got '{further.text}'.", text=further.text
+            )
+        wishes.append(further)
+    discount_taken([wish, *wishes], wanted.discount)
+    return wishes
+
+
+def _explainable(wanted: Wanted, also: Sequence[str] = ()) -> tuple[Problem, list[Objective]]:
+    """Return the problem with an objective that has a best value, unfolded with what must be remembered, and what else is wanted."""
     from ratherthan.errors import NotExplainableError
 
     problem = problem_of(wanted)
     try:
-        return _with_objective(problem, _wish(wanted, problem))
+        wish = _wish(wanted, problem)
+        wishes = _further(wanted, problem, wish, also)
+        return _with_objective(problem, wish), wishes
     except NotExplainableError as error:
-        raise NotExplainableError(f"{error.message} ratherthan solve can give its value.", **error.place) from error
+        if len(wanted.properties) != 1 or also:
+            raise
+        raise NotExplainableError(
+            f"{error.message} ratherthan solve can ask Storm for its value.", **error.place
+        ) from error
 
 
 def _with_objective(problem: Problem, wish: Objective | Threshold) -> Problem:

@@ -40,15 +40,17 @@ def tradeoffs_of(wanted: Wanted, given: Mapping[str, Any]) -> Tradeoffs:
 def _wishes(wanted: Wanted, problem: Problem, also: tuple[str, ...]) -> list[Objective]:
     """Return the objectives; where there is but one, also the least of each other reward until the same goal."""
     from ratherthan.errors import QuestionError
+    from ratherthan.model.discounts import discount_taken
     from ratherthan.model.further import further_objective, least_of
     from ratherthan.model.objective import ReachAvoid, levels_of
-    from ratherthan.model.property import choose_objective
+    from ratherthan.model.property import wish_of
 
     wishes: list[Objective] = []
     for text in wanted.properties or (None,):
-        wishes += levels_of(_best(choose_objective(problem, text, discount=wanted.discount)))
+        wishes += levels_of(_best(wish_of(problem, text, discount=wanted.discount)))
     for text in also:
-        wishes += levels_of(_best(further_objective(problem, text, [*levels_of(wishes[0])])))
+        wishes += levels_of(_best(further_objective(problem, text, levels_of(wishes[0]), discount=wanted.discount)))
+    discount_taken(wishes, wanted.discount)
     own = wishes[0]
     if len(wishes) == 1 and not isinstance(own, ReachAvoid):
         others = [least_of(name, level) for name in problem.mdp.rewards for level in levels_of(own)]

@@ -33,7 +33,7 @@ def explain(
     solution: Solution,
     kind: str | None = None,
     *,
-    also: Iterable[str | Objective] = (),
+    also: str | Objective | Iterable[str | Objective] = (),
     asked: Question | None = None,
     **details: Any,
 ) -> Explanation:
@@ -62,7 +62,8 @@ def explain(
     Raises
     ------
     QuestionError
-        If the question does not fit the model: an unknown action or state, several initial states and none chosen.
+        If the question does not fit the model: an unknown action or state, several initial states and none chosen; or if
+        `also` is no list of objectives.
     PolicyError
         If the policy says nothing at the state asked about.
     PropertyError
@@ -72,8 +73,10 @@ def explain(
         asked = question(kind, **details)
     elif kind is not None or details:
         raise QuestionError("Give either a question or its parts, got both.")
-    if isinstance(also, str):
+    if isinstance(also, str | Objective):
         also = (also,)
+    if not isinstance(also, Iterable):
+        raise QuestionError(f"Further objectives must be a list of objectives or properties, got {also!r}.")
     return _Explainer(solution=solution, asked=asked, also=further_objectives(solution, also)).explanation()
 
 

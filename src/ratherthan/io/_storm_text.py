@@ -50,6 +50,8 @@ class Translated:
         Whether it says min or max anywhere, or asks for several objectives: then there must be decisions.
     from_zero : bool
         Whether a reward adds up without a bound on steps, or bounds a path: then none may be negative.
+    averaged : bool
+        Whether it asks for the mean of a reward in the long run.
     """
 
     text: str = ""
@@ -57,6 +59,7 @@ class Translated:
     rewards: dict[str, Reward] = field(default_factory=dict)
     chosen: bool = False
     from_zero: bool = False
+    averaged: bool = False
 
 
 def translated(text: str, problem: Problem) -> Translated:
@@ -204,6 +207,7 @@ class _Reader:
             self.found.from_zero = True
             return False
         self.found.from_zero |= word.startswith("C") and self.words[self.at + 1] == "]"
+        self.found.averaged |= word in ("S", "LRA")
         self._take()
         self._bound()
         return True

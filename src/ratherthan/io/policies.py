@@ -138,9 +138,9 @@ def _of_array(array: npt.NDArray[Any], mdp: MDP, what: str, *, minimise_q: bool)
     values = np.where(column >= 0, array[state, np.maximum(column, 0)].astype(np.float64), np.nan)
     silent = np.isnan(values) | np.isneginf(values)
     worth = np.where(silent, -np.inf, -values if minimise_q else values)
-    if silent.all():
+    if not np.isfinite(values).any():
         raise PolicyError(
-            f"{what} must have a number for some enabled action, but all of them are NaN or -inf. "
+            f"{what} must have a finite number for some enabled action, but all of them are NaN, -inf or inf. "
             "Check that it was filled, and that its columns are the model's actions in their order."
         )
     return Policy(choice=_first_best(mdp, state, worth, silent))

@@ -2,6 +2,8 @@
 
 Storm works in a process of its own: it can be interrupted at any moment, and neither what it prints nor a crash of it
 reaches the caller. It is handed the model as a file of arrays and the property in bare words (`ratherthan.io._storm_text`).
+The mean in the long run of a reward that may be negative it can refine for ever; so it is asked for that of the reward plus a
+constant, which is larger by the constant. Where that cannot be done, there is an end to our patience.
 Its number comes without a certificate of ours: no bounds are told, and no claim may rest on it.
 """
 
@@ -11,6 +13,7 @@ import importlib.util
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -26,12 +29,18 @@ from ratherthan.io._storm_text import Translated, translated
 from ratherthan.io._storm_words import outer_filter
 from ratherthan.io.umb_write import write_umb
 from ratherthan.model.formula import states_where
-from ratherthan.model.mdp import MDP, Bools, Floats
+from ratherthan.model.mdp import MDP, Bools, Floats, Reward
 from ratherthan.model.names import StateNames
 from ratherthan.model.problem import Problem
 from ratherthan.model.states import start_of
 
 __all__ = ["StormAnswer", "ask_storm", "storm_is_there"]
+
+_PATIENCE = 3600.0
+"""For how many seconds Storm may work on a property."""
+_PATIENCE_FOR_MEANS = 30.0
+"""The same for the mean of a reward that may be negative, which it finds at once or never."""
+_MEAN = re.compile(r'R\{"(\w+)"\}(?:min|max)?=\? \[ (?:LRA|S) \]')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +98,8 @@ def ask_storm(problem: Problem, text: str) -> StormAnswer:
     ------
     PropertyError
         Where Storm, or we before it, cannot read the property, or there is no one value.
+    SourceError
+        Where Storm broke off, or did not come to an end.
     MissingExtraError
         Where Storm is not installed.
     """
@@ -115,19 +126,32 @@ def ask_storm(problem: Problem, text: str) -> StormAnswer:
 def _asked(problem: Problem, wanted: Translated, *, every: bool) -> tuple[StormAnswer, Floats | Bools]:
     """Ask Storm in a process of its own; return its answer at the start, and in every state if that is asked for."""
     _check_signs(wanted)
+    wanted, raised = _raised(wanted)
     with tempfile.TemporaryDirectory(prefix="ratherthan-") as name:
         folder = Path(name)
         chain = problem.mdp.choices == problem.mdp.states and not wanted.chosen
         write_umb(_bare(problem.mdp, wanted), folder / "model.umb", packing="none", players=0 if chain else 1)
         question = {"text": wanted.text, "every": every}
         (folder / "question.json").write_text(json.dumps(question), encoding="utf-8")
-        said = _said(folder, _run(folder), wanted)
+        said = _said(folder, _run(folder, _patience(wanted)), wanted)
         values = np.load(folder / "values.npy", allow_pickle=False) if every else np.zeros(0)
-    value = said["value"] if isinstance(said["value"], bool) else float(said["value"])
+    value = said["value"] if isinstance(said["value"], bool) else float(said["value"]) - raised
     if math.isnan(value):
         raise PropertyError("Storm must come to a number, but it says that the value is not defined here.")
-    bounds = {key: float(said[key]) for key in ("lower", "upper") if said[key] is not None and not every}
+    bounds = {key: float(said[key]) - raised for key in ("lower", "upper") if said[key] is not None and not every}
+    values = values - raised if raised else values
     return StormAnswer(text="", value=value, engine=f"Storm {said['version']}", **bounds), values
+
+
+def _raised(wanted: Translated) -> tuple[Translated, float]:
+    """Return a property without negative rewards if it is the mean of one in the long run, and how much was added to it."""
+    mean = _MEAN.fullmatch(wanted.text)
+    if mean is None:
+        return wanted, 0.0
+    reward = wanted.rewards[mean[1]]
+    least = {part: min(float(values.min()), 0.0) for part, values in reward.parts()}
+    parts = {part: values - least[part] for part, values in reward.parts()}
+    return replace(wanted, rewards={mean[1]: Reward(**parts)}), 0.0 - sum(least.values())
 
 
 def _check_signs(wanted: Translated) -> None:
@@ -144,6 +168,15 @@ def _check_signs(wanted: Translated) -> None:
                 )
 
 
+def _patience(wanted: Translated) -> float:
+    """Return for how many seconds Storm may work."""
+    return _PATIENCE_FOR_MEANS if wanted.averaged and any(map(_may_be_negative, wanted.rewards.values())) else _PATIENCE
+
+
+def _may_be_negative(reward: Reward) -> bool:
+    return any((values < 0).any() for _, values in reward.parts())
+
+
 def _bare(mdp: MDP, wanted: Translated) -> Problem:
     """Return the model with nothing but what the property needs."""
     return Problem(
@@ -158,8 +191,8 @@ def _bare(mdp: MDP, wanted: Translated) -> Problem:
     )
 
 
-def _run(folder: Path) -> int:
-    """Run Storm on a folder; return its exit code."""
+def _run(folder: Path, patience: float) -> int:
+    """Run Storm on a folder for so many seconds at most; return its exit code."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     command = [sys.executable, "-m", "ratherthan.io._storm_answer", str(folder)]
     process = subprocess.Popen(
@@ -171,11 +204,27 @@ def _run(folder: Path) -> int:
         stderr=subprocess.DEVNULL,
     )
     try:
-        return process.wait()
+        return process.wait(timeout=patience)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+        raise SourceError(
+            f"Storm must come to an answer in time, but after {patience:g} seconds it has none{_why(patience)}. "
+            "Ask for something smaller, or bound the number of steps."
+        ) from None
     except BaseException:
         process.kill()
         process.wait()
         raise
+
+
+def _why(patience: float) -> str:
+    """Return why there may be no end, where that is known."""
+    return (
+        ": the mean in the long run of a reward that may be negative it can refine for ever"
+        if patience < _PATIENCE
+        else ""
+    )
 
 
 def _said(folder: Path, code: int, wanted: Translated) -> dict[str, Any]:

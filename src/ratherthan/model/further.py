@@ -18,13 +18,15 @@ from ratherthan.model.objective import (
     Threshold,
 )
 from ratherthan.model.problem import Problem
-from ratherthan.model.property import choose_objective
+from ratherthan.model.property import wish_of
 from ratherthan.model.weights import canonical_reward
 
 __all__ = ["further_objective", "least_of"]
 
 
-def further_objective(problem: Problem, text: str, levels: Sequence[Level]) -> Objective | Threshold:
+def further_objective(
+    problem: Problem, text: str, levels: Sequence[Level], *, discount: float | None = None
+) -> Objective | Threshold:
     """Return what a property, its name in the source or the name of a reward means beside a plan.
 
     Parameters
@@ -33,6 +35,8 @@ def further_objective(problem: Problem, text: str, levels: Sequence[Level]) -> O
     text : str
     levels : sequence of objectives
         The plan's own.
+    discount : float, optional
+        For a sum without end that has none of its own.
 
     Raises
     ------
@@ -42,7 +46,7 @@ def further_objective(problem: Problem, text: str, levels: Sequence[Level]) -> O
     bracketed = set(text) & set("[]") and text not in problem.mdp.rewards
     reward = None if bracketed else canonical_reward(text, problem.mdp.rewards)
     if reward is None:
-        return choose_objective(problem, text)
+        return wish_of(problem, text, discount=discount)
     for level in levels:
         found = least_of(reward, level)
         if found is not None:

@@ -7,7 +7,7 @@ What is said behind the name of a state, and only if it is so:
 * how many steps are left, where one bound is running;
 * in an end "done", "failed", or "too late" where nothing but its steps can make the mission fail; where the mission is to be
   avoided (its chance is minimised) "failed", or "averted" where it can come no more;
-* what is left to do, where the above does not tell two memories apart.
+* what is left to do, where the above does not tell two memories apart; what is longer than a line is cut, and numbered.
 
 Nothing is said where all of the mission is still to do.
 """
@@ -29,6 +29,10 @@ __all__ = ["endings", "pair_names"]
 
 _DONE, _FAILED, _LATE, _AVERTED = "done", "failed", "too late", "averted"
 _PARTICIPLE = ("done", "got", "found", "met", "made", "taken", "seen", "sent", "brought", "left", "won", "lost")
+_COMPARED = {
+    "=": "was", "!=": "was not", "<": "was below", "<=": "was at most", ">": "was above", ">=": "was at least"
+}  # fmt: skip
+_MOST_LETTERS = 100  # of what is said behind a name
 _MOST_VARIABLES = 6  # a state with more is called by its number
 
 
@@ -88,8 +92,9 @@ def endings(automaton: Automaton, memories: Sequence[int], *, maximise: bool = T
     for m in memories:
         if counted[said[m]] > 1 and not spoken.fixed(m):
             said[m] = f"left: {spoken.exactly(m)}"
+    said = {m: _shortened(text) for m, text in said.items()}
     taken: Counter[str] = Counter()
-    for m in memories:  # a label may be spelt like any of these words
+    for m in memories:  # a label may be spelt like any of these words, and long ones may begin alike
         taken[said[m]] += 1
         if taken[said[m]] > 1:
             said[m] = f"{said[m]} ({taken[said[m]]})"
@@ -253,7 +258,10 @@ def _can_be_reached(term: Term) -> bool:
 
 
 def _reached(term: Term) -> str:
-    """Return a state formula as something done: "picked up", "door reached"."""
+    """Return a state formula as something done: "picked up", "door reached", "x was 3"."""
+    if term.op in _COMPARED:
+        left, right = (text_of(arg) for arg in term.args)
+        return f"{left} {_COMPARED[term.op]} {right}"
     words = _called(term)
     done = any(word in _PARTICIPLE or re.fullmatch(r"\w{2,}[^\We]ed", word) for word in words.split())
     reserved = words in (_DONE, _FAILED, _LATE, _AVERTED) or re.fullmatch(r"\d+ steps? left", words)
@@ -270,6 +278,14 @@ def _called(term: Term) -> str:
         words = [f"({_called(arg)})" if arg.op in ("&", "|") else _called(arg) for arg in term.args]
         return (" and " if term.op == "&" else " or ").join(words)
     return text_of(term)
+
+
+def _shortened(text: str) -> str:
+    """Return a text, cut behind a word where it is longer than a line."""
+    if len(text) <= _MOST_LETTERS:
+        return text
+    kept = text[:_MOST_LETTERS].rpartition(" ")[0] or text[:_MOST_LETTERS]
+    return f"{kept.rstrip(' (,')} …"
 
 
 def _steps(count: int) -> str:

@@ -16,7 +16,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from ratherthan.errors import PropertyError
+from ratherthan.errors import NotExplainableError, PropertyError
+from ratherthan.model.discounts import GOALS, discount_of, discount_taken, fitting
 from ratherthan.model.formula import constant, resolved, states_of
 from ratherthan.model.objective import (
     Discounted,
@@ -32,15 +33,14 @@ from ratherthan.model.objective import (
 from ratherthan.model.path import is_temporal, plain_until, positive, state_formulas
 from ratherthan.model.problem import Problem
 from ratherthan.model.syntax import Term, text_of
-from ratherthan.model.temporal import Statement, chance_of, refusal, until_of
+from ratherthan.model.temporal import Statement, chance_of, until_of
 from ratherthan.model.valuation import one_of
 from ratherthan.model.weights import canonical_reward
 
-__all__ = ["choose_objective", "lexicographic", "parse_property"]
+__all__ = ["choose_objective", "lexicographic", "parse_property", "wish_of"]
 
-_GOALS = ("goal", "target", "destination")
 _MOST_LISTED = 12
-_THEN = re.compile(r"(?<=\])\s*then\s+")
+_THEN = re.compile(r"(?:(?<=\])\s*|\s+)then\s+")
 
 
 def parse_property(text: str, problem: Problem, *, discount: float | None = None) -> Objective | Threshold:
@@ -54,7 +54,7 @@ def parse_property(text: str, problem: Problem, *, discount: float | None = None
     problem : Problem
         Its model, and the constants and formulas that the property may mention.
     discount : float, optional
-        For ``R{"r"}max=? [C]``.
+        For ``R{"r"}max=? [C]``; of several properties those without end take it.
 
     Returns
     -------
@@ -67,12 +67,22 @@ def parse_property(text: str, problem: Problem, *, discount: float | None = None
         For a syntax error (with its column), unknown labels, rewards and names, numbers where truth values are needed, and
         properties that cannot be explained (with the nearest that can).
     """
+    wish = _parsed(text, problem, discount)
+    discount_taken([wish], discount)
+    return wish
+
+
+def _parsed(text: str, problem: Problem, discount: float | None) -> Objective | Threshold:
+    """Read one property, or several with "then" between them; the discount is for those that need one."""
     from ratherthan.model.reading import read
 
     parts = _parts(text)
     if len(parts) > 1:
-        return lexicographic([parse_property(part, problem, discount=discount) for part in parts])
-    statement: Statement = read("property", text, "property")
+        return lexicographic([_parsed(part, problem, discount) for part in parts])
+    try:
+        statement: Statement = read("property", text, "property")
+    except NotExplainableError as error:
+        raise fitting(error, text, problem) from error
     try:
         return _meaning(statement, problem, text, discount)
     except RecursionError:
@@ -171,12 +181,7 @@ def _objective(
     """Return the objective of a statement, refusing paths that cannot be explained."""
     path = said.path
     if path.op == "C":
-        return Discounted(reward=reward, discount=_discount(path, problem, discount), maximise=maximise)
-    if discount is not None:
-        raise PropertyError(
-            f"A discount must come with a sum without end, such as R{{\"reward\"}}max=? [C], got '{path.op}' and the discount "
-            f"{discount:g}."
-        )
+        return Discounted(reward=reward, discount=discount_of(said, reward, problem, discount), maximise=maximise)
     if said.operator == "P":
         return _chance(path, problem, maximise=maximise)
     kind = ExpectedReward if path.value == "sure" else ExpectedCost
@@ -198,20 +203,6 @@ def _chance(path: Term, problem: Problem, *, maximise: bool) -> ReachAvoid | Mis
         return Mission(formula=text_of(said), maximise=maximise)
     through, goal = plain
     return ReachAvoid(goal=text_of(goal), through=None if through is None else text_of(through), maximise=maximise)
-
-
-def _discount(path: Term, problem: Problem, given: float | None) -> float:
-    """Return the discount that a path or the caller gives."""
-    if path.args:
-        said = constant(resolved(path.args[0], problem.definitions))
-        if given is not None and given != said:
-            raise PropertyError(f"A discount must be given once, got {said:g} in the property and {given:g} beside it.")
-        given = said
-    if given is None:
-        raise refusal("total")
-    if not 0 < given < 1:
-        raise PropertyError(f"A discount must lie between 0 and 1, both excluded, got {given:g}.", discount=given)
-    return float(given)
 
 
 def choose_objective(
@@ -238,21 +229,53 @@ def choose_objective(
     PropertyError
         If `text` cannot be read, or without it if there is no such property; it lists what there is.
     """
-    if text is not None:
-        name = text.strip().removeprefix('"').removesuffix('"')
-        if name in problem.properties:
-            return problem.properties[name]
-        return _parsed_or_named(problem.others.get(name, text), problem, discount)
-    if discount is not None:
+    if text is None and discount is not None:
         raise PropertyError("A discount must come with a property, such as --property 'R{\"reward\"}max=? [C]'.")
+    wish = wish_of(problem, text, discount=discount)
+    discount_taken([wish], discount)
+    return wish
+
+
+def wish_of(problem: Problem, text: str | None = None, *, discount: float | None = None) -> Objective | Threshold:
+    """Return what is wanted as `choose_objective` does; the discount is for what needs one, and may be needed by nothing.
+
+    Parameters
+    ----------
+    problem : Problem
+    text : str, optional
+    discount : float, optional
+
+    Raises
+    ------
+    PropertyError
+        As `choose_objective`.
+    """
+    if text is not None:
+        own = _own(text, problem)
+        if own is not None:
+            return own
+        parts = _parts(text)
+        if len(parts) > 1:
+            return lexicographic([wish_of(problem, part, discount=discount) for part in parts])
+        return _parsed_or_named(problem.others.get(_bare(text), text), problem, discount)
     if problem.objective is not None:
         return problem.objective
     if len(problem.properties) == 1:
         return next(iter(problem.properties.values()))
-    goals = [label for label in _GOALS if label in problem.mdp.labels]
+    goals = [label for label in GOALS if label in problem.mdp.labels]
     if len(problem.mdp.rewards) == 1 and len(goals) == 1:
         return ExpectedCost(goal=text_of(Term("label", value=goals[0])), reward=next(iter(problem.mdp.rewards)))
     raise PropertyError(_what_there_is(problem))
+
+
+def _bare(text: str) -> str:
+    """Return a name without the quotation marks that may stand around it."""
+    return text.strip().removeprefix('"').removesuffix('"')
+
+
+def _own(text: str, problem: Problem) -> Objective | Threshold | None:
+    """Return the property of the source that has this name."""
+    return problem.properties.get(_bare(text))
 
 
 def _parsed_or_named(text: str, problem: Problem, discount: float | None) -> Objective | Threshold:
@@ -263,13 +286,13 @@ def _parsed_or_named(text: str, problem: Problem, discount: float | None) -> Obj
             f"A property must be in PRISM's syntax or one of the source's own: {names}; got '{text.strip()}'.",
             text=text,
         )
-    return parse_property(text, problem, discount=discount)
+    return _parsed(text, problem, discount)
 
 
 def _what_there_is(problem: Problem) -> str:
     """Say which properties, rewards and labels there are, with an example to copy."""
     mdp = problem.mdp
-    goals = [label for label in _GOALS if label in mdp.labels] or list(mdp.labels) or ["init"]
+    goals = [label for label in GOALS if label in mdp.labels] or list(mdp.labels) or ["init"]
     head = f'R{{"{next(iter(mdp.rewards))}"}}min' if mdp.rewards else "Pmax"
     listed = [
         f"{what}: {', '.join(names[:_MOST_LISTED]) + (' …' if len(names) > _MOST_LISTED else '') if names else 'none'}"

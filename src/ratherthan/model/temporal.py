@@ -23,13 +23,14 @@ from ratherthan.model.path import (
 from ratherthan.model.problem import Problem
 from ratherthan.model.syntax import TEMPORAL, Term, text_of
 
-__all__ = ["REFUSED", "Statement", "chance_of", "refusal", "shown_path", "until_of"]
+__all__ = ["REFUSED", "Statement", "chance_of", "refusal", "shown_path", "until_of", "with_example"]
 
-_ARRIVE, _COST = 'Pmax=? [F "goal"]', 'R{"cost"}min=? [F "goal"]'
+_EXAMPLE = ('R{"cost"}min=?', 'F "goal"')
+_ARRIVE, _COST = 'Pmax=? [F "goal"]', f"{_EXAMPLE[0]} [{_EXAMPLE[1]}]"
 REFUSED = {
     "total": (
         "C (a reward that adds up without end)",
-        f'the discounted sum, R{{"cost"}}max=? [Cdiscount=0.95], or the reward until a goal, {_COST}',
+        "the discounted sum, {head} [Cdiscount=0.95], or the reward until a goal, {head} [{path}]",
     ),
     "partial": ("C with a bound (the reward within some steps)", f"the reward until a goal, {_COST}"),
     "instant": ("I (the reward at one instant)", f"the reward until a goal, {_COST}"),
@@ -63,13 +64,28 @@ class Statement:
     path: Term
 
 
-def refusal(what: str, nearest: str = "") -> PropertyError:
-    """Return the error that names what cannot be explained, and the nearest property that can."""
+def refusal(what: str, nearest: str = "", *, example: tuple[str, str] = _EXAMPLE) -> PropertyError:
+    """Return the error that names what cannot be explained, and the nearest property that can.
+
+    Parameters
+    ----------
+    what : str
+        Its name, or without `nearest` its key among those that are known.
+    nearest : str
+    example : tuple of str
+        How a question about the same reward begins, and a path for it.
+    """
     if not nearest:
         what, nearest = REFUSED[what]
+        nearest = nearest.replace("{head}", example[0]).replace("{path}", example[1])
     return NotExplainableError(
         f"{what[0].upper()}{what[1:]} cannot be explained here. The nearest that can: {nearest}."
     )
+
+
+def with_example(error: NotExplainableError, example: tuple[str, str]) -> NotExplainableError:
+    """Return a refusal with another example of a reward: how a question about it begins, and a path for it."""
+    return NotExplainableError(error.message.replace(_COST, f"{example[0]} [{example[1]}]"), **error.place)
 
 
 def until_of(path: Term, operator: str, *, maximise: bool) -> Term:

@@ -20,7 +20,8 @@ def contrast_reason(words: Vocabulary, step: Step) -> str:
     key = "open" if not told else told[-1].claim
     if told and key == "better" and _rows(told[-1])[1].fate is not None:
         key = "avoids"
-    filled = {"clause": _clauses(words, step, told) if told else ""} | counted
+    clause = _clauses(words, step, told) if told else ""
+    filled = {"clause": clause, "doing": words.doing(step.action)} | counted
     template: str = words.table("contrasts")[key][flexibility]
     return template.format(**filled)
 

@@ -25,13 +25,20 @@ def measured(row: Measured | Tally) -> Measured:
 
 def pair(words: Vocabulary, wanted: Wanted, own: float, others: Sequence[float]) -> str:
     """Return better numbers beside the own: all of them, the best where others look like the own, or that it is close."""
-    numbers, chance, unit = words.table("numbers"), wanted.record.chance, wanted.words["unit"]
+    numbers, chance, named = words.table("numbers"), wanted.record.chance, wanted.words["named"]
     found = contrasted(own, others, numbers, chance=chance)
     if found:
         listed = words.language.joined(list(dict.fromkeys(found[1])), "or")
-        return str(numbers["pair"].format(better=listed, own=found[0], unit=unit))
+        return str(numbers["pair"].format(better=listed, own=_with_unit(words, wanted, found[0]), named=named))
     found = contrasted(own, [max(others) if wanted.record.maximise else min(others)], numbers, chance=chance)
-    return str(numbers["best"].format(better=found[1][0], own=found[0], unit=unit) if found else numbers["close"])
+    if not found:
+        return str(numbers["close"].format(named=named))
+    return str(numbers["best"].format(better=found[1][0], own=_with_unit(words, wanted, found[0]), named=named))
+
+
+def _with_unit(words: Vocabulary, wanted: Wanted, number: str) -> str:
+    """Return a number with its unit, in the singular where it is 1."""
+    return words.language.counted(number + wanted.words["unit"])
 
 
 def values(words: Vocabulary, wanted: Wanted, numbers: Sequence[float]) -> str:

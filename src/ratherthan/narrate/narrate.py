@@ -69,8 +69,9 @@ def _end(words: Vocabulary) -> str:
     explanation = words.explanation
     if explanation.route_outcome == "there":
         return words.objective["there"]
-    template: str = words.table("route")[explanation.route_outcome]
-    return template.format(place=words.place(explanation.start))
+    key = "ended_mission" if explanation.unfolded is not None and explanation.objective.maximise else "ended"
+    template: str = words.table("route")[key]
+    return template.format(place=words.place(explanation.start), arrive=words.objective["arrive"])
 
 
 def _route_text(words: Vocabulary) -> str:
@@ -101,8 +102,10 @@ def _open_end(words: Vocabulary) -> list[str]:
         return []
     if explanation.route[-2:] == (last, last):
         return [table["remain"].format(place=words.place(last))]
-    again = explanation.objective.kind == "discounted" and last in explanation.route[:-1]
-    return [table["again"].format(place=words.place(last))] if again else []
+    if explanation.objective.kind != "discounted" or last not in explanation.route[:-1]:
+        return []
+    surely = explanation.route_probability == 1.0 and all(step.share == 1.0 for step in explanation.steps)
+    return [table["again_surely" if surely else "again"].format(place=words.place(last))]
 
 
 def _told(words: Vocabulary, steps: Sequence[Step], *, selective: bool) -> list[str]:
@@ -144,7 +147,8 @@ def _closing(words: Vocabulary, told: Sequence[Step]) -> list[str]:
     if not told:
         most = _largest_untold(words)
         if not most and not asked.alpha and not asked.omega:
-            noun = words.language.joined([words.objectives[k].words["noun"] for k in range(_levels(words))], "or")
+            nouns = dict.fromkeys(words.objectives[k].words["noun"] for k in range(_levels(words)))
+            noun = words.language.joined(list(nouns), "or")
         key = "no_decision_after" if asked.omega and most else "no_decision_by" if most else "no_decision"
         sentences.append(route[key].format(noun=noun, largest=at_most(most)))
     elif closing.printed:
@@ -198,6 +202,8 @@ def _no_way(words: Vocabulary) -> str:
     route, explanation = words.table("route"), words.explanation
     place = words.place(explanation.start)
     arrive = words.objective["arrive"]
+    if explanation.unfolded is not None:  # states of a product: what is remembered makes many of one place
+        return str(route["no_way_mission"].format(arrive=arrive, place=place))
     if explanation.in_the_way:
         places = words.places(explanation.in_the_way)
         return str(route["no_way_hazards"].format(arrive=arrive, place=place, places=places))
@@ -211,11 +217,16 @@ def _no_way(words: Vocabulary) -> str:
 
 def _circle(words: Vocabulary) -> str:
     explanation = words.explanation
-    key = "stay" if explanation.circle_size == 1 else "circle"
+    key = "circle" if explanation.circle_size > 1 else "stay" if _goes_on(explanation) else "end"
     if not explanation.circle_certain:
         key += "_perhaps"
     places = words.places(explanation.circle, explanation.circle_size)
     return str(words.table("route")[key].format(arrive=words.objective["arrive"], places=places))
+
+
+def _goes_on(explanation: Explanation) -> bool:
+    """Return whether the plan has something to do where it circles; else the objective has ended there, badly."""
+    return any(state in explanation.circle for state, _, _ in explanation.policy.choices)
 
 
 def _chances(words: Vocabulary) -> list[str]:

@@ -75,10 +75,10 @@ def at_most(value: float) -> str:
 
     Examples
     --------
-    >>> at_most(4.0000000001), at_most(2.341)
-    ('4', '2.35')
+    >>> at_most(4.0000000001), at_most(2.341), at_most(4e-7)
+    ('4', '2.35', '0.01')
     """
     near = round(value, 2)
-    if abs(near - value) > 1e-6 * max(1.0, abs(value)):
+    if abs(near - value) > 1e-6 * abs(value):  # the width of certified bounds, never so much as to make it nothing
         near = math.ceil(value * 100) / 100
     return f"{near:.2f}".rstrip("0").rstrip(".")

@@ -114,13 +114,16 @@ def weight_head(found: Tradeoffs, objective: int) -> str:
 
 
 def weight_range(found: Tradeoffs, place: int, objective: int) -> str:
-    """Return for which weights of an objective a plan is best: "W from 2.778 to 12.5"."""
+    """Return for which weights of an objective a plan is known to be best: "W from 2.778 to 12.5"."""
     words = _templates(found.problem.lexicon.language)["weights"]
     weights = found.plans[place].weights[objective]
     if weights is None:
         return str(words["none"])
     low, high = weights
-    key = "onward" if high == np.inf else "up_to" if low == 0 else "between" if low < high else "only"
+    other = found.objectives[objective]
+    if low == np.inf:  # for no weight that there is: for the other objective alone
+        return str(words["alone"][_way(other)]).format(name=_name(other))
+    key = "only" if low == high else "onward" if high == np.inf else "up_to" if low == 0 else "between"
     if low == 0 and high == np.inf:
         key = "all"
     return str(words[key]).format(low=rounded(low), high=rounded(high))

@@ -14,6 +14,7 @@ from ratherthan.errors import InputError
 from ratherthan.explain.explanation import Explanation, ObjectiveRecord
 from ratherthan.model.lexicon import Lexicon
 from ratherthan.narrate import english
+from ratherthan.narrate.naming import goals_in_words, told_apart
 
 __all__ = ["Language", "Vocabulary", "language", "vocabulary"]
 
@@ -56,10 +57,11 @@ def language(code: str) -> Language:
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """An objective and its words: best, best_flexible, among, better, worse, equal, noun and so on, as the templates list."""
+    """An objective, its words (best, best_flexible, among, better and so on, as the templates list), and its goal in words."""
 
     record: ObjectiveRecord
     words: Mapping[str, str]
+    goal: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,13 +159,31 @@ def vocabulary(explanation: Explanation) -> Vocabulary:
     spoken = language(explanation.lexicon.language)
     records = (*explanation.levels, *(further.objective for further in explanation.also))
     lexicon, shorten = explanation.lexicon, spoken.shortened
-    words = [_objective_words(record, spoken.templates, lexicon, shorten) for record in records]
-    words = _told_apart(words, _properties(explanation), spoken.templates["phrases"])
+    properties, phrases = _properties(explanation), spoken.templates["phrases"]
+    goals = goals_in_words(properties, phrases)
+    others = _other_goals(records, goals)
+    words = [
+        _objective_words(record, spoken.templates, lexicon, shorten, other)
+        for record, other in zip(records, others, strict=True)
+    ]
+    words = told_apart(words, properties, goals, phrases)
     return Vocabulary(
         explanation=explanation,
         language=spoken,
-        objectives=tuple(Wanted(record=record, words=own) for record, own in zip(records, words, strict=True)),
+        objectives=tuple(
+            Wanted(record=record, words=own, goal=goal) for record, own, goal in zip(records, words, goals, strict=True)
+        ),
     )
+
+
+def _other_goals(records: Sequence[ObjectiveRecord], goals: Sequence[str | None]) -> list[str | None]:
+    """Return the goal of each chance to arrive that must be called by its goal; None for those that need not be."""
+    likely = [record.kind in ("probability", "safety") for record in records]
+    known = {goal for goal, chance in zip(goals, likely, strict=True) if chance and goal is not None}
+    return [
+        goal if chance and (i or likely[0]) and known - {goals[0]} else None
+        for i, (goal, chance) in enumerate(zip(goals, likely, strict=True))
+    ]
 
 
 def _properties(explanation: Explanation) -> list[str]:
@@ -173,28 +193,17 @@ def _properties(explanation: Explanation) -> list[str]:
     return [*own, *(further.property for further in explanation.also)]
 
 
-def _told_apart(
-    words: list[dict[str, str]], properties: Sequence[str], phrases: Mapping[str, str]
-) -> list[dict[str, str]]:
-    """Let numbers carry the name of their objective where two objectives have the same words."""
-    comparatives, nouns = ([own[key] for own in words] for key in ("better", "noun"))
-    told = []
-    for own, text in zip(words, properties, strict=True):
-        same = nouns.count(own["noun"]) > 1
-        if comparatives.count(own["better"]) > 1:
-            unit = own["unit"] + phrases["named"].replace("{what}", text if same else own["noun"])
-            own = {**own, "unit": unit}
-        told.append({**own, "amount": own["amount"] + phrases["which"].replace("{what}", text)} if same else own)
-    return told
-
-
 _LISTED = ("distance", "time", "steps", "risk", "collisions")
 
 
 def _objective_words(
-    record: ObjectiveRecord, templates: Mapping[str, Any], lexicon: Lexicon, shorten: Callable[[str], str]
+    record: ObjectiveRecord,
+    templates: Mapping[str, Any],
+    lexicon: Lexicon,
+    shorten: Callable[[str], str],
+    goal: str | None,
 ) -> dict[str, str]:
-    """Return the words of an objective, those of a lexicon first."""
+    """Return the words of an objective, those of a lexicon first; `goal` is what it is called by, if it is."""
     direction = "max" if record.maximise else "min"
     if record.kind in ("cost", "reward"):
         key = record.reward or "steps"
@@ -205,8 +214,16 @@ def _objective_words(
     own = lexicon.objectives.get(key, {})
     short = {f"{name}_one": shorten(own[name]) for name in ("best", "among", "better", "worse") if name in own}
     words = {**words, **short}
+    for name in ("up_to", "up_to_short"):
+        words[name] = templates["phrases"][f"{name}_chance" if record.chance else name]
     arriving = templates["arriving"]
-    filled = {**words, **arriving.get(record.kind, arriving["usual"])}
+    ways = arriving.get(record.kind, arriving["usual"])
+    if goal is not None:
+        ways = {
+            **ways,
+            **{name: text.replace("{goal}", goal) for name, text in arriving[f"other_{record.kind}"].items()},
+        }
+    filled = {name: text.replace("{arrive}", ways["arrive"]) for name, text in words.items()} | ways
     reward, formula = _reward_in_words(record.reward, templates["phrases"]), (record.formula or "").replace('"', "")
     plain = {
         name: text.replace("{reward}", reward).replace("{formula}", formula) if "{" in text else text

@@ -18,6 +18,7 @@ __all__ = [
     "Factors",
     "Ordered",
     "Rows",
+    "backward_pass",
     "drift_rows",
     "eliminate",
     "elimination_tree",
@@ -25,6 +26,7 @@ __all__ = [
     "gather_rows",
     "mean_rows",
     "ordered_rows",
+    "sinks_first",
     "substitute",
     "sweep",
     "window_pass",
@@ -411,3 +413,102 @@ def mean_rows(
         else:
             mean[c], spread[c] = first + moved, size
     return mean, spread
+
+
+def sinks_first(begin: Ints64, target: Ints64) -> Ints64:
+    """Return the nodes in an order in which each comes after all that it leads to; nothing where there is none.
+
+    The branches of node s are ``begin[s]`` up to ``begin[s+1]``; targets from the number of nodes on are sinks.
+    """
+    n = len(begin) - 1
+    order = np.zeros(n, np.int64)
+    seen = np.zeros(n, np.int8)  # 1: it is being searched from; 2: all that it leads to is in order
+    following = begin[:n].copy()
+    stack = np.zeros(n, np.int64)
+    filled = 0
+    for root in range(n):
+        if seen[root] != 0:
+            continue
+        stack[0] = root
+        seen[root] = 1
+        height = 1
+        while height > 0:
+            s = stack[height - 1]
+            if following[s] == begin[s + 1]:
+                seen[s] = 2
+                order[filled] = s
+                filled += 1
+                height -= 1
+                continue
+            t = target[following[s]]
+            following[s] += 1
+            if t >= n or seen[t] == 2:
+                continue
+            if seen[t] == 1:
+                return order[:0]
+            seen[t] = 1
+            stack[height] = t
+            height += 1
+    return order
+
+
+def backward_pass(
+    rows: tuple[Ints64, Ints64, Ints64],
+    probability: Floats,
+    paid: tuple[Floats, Floats, npt.NDArray[np.bool_]],
+    order: Ints64,
+    known: Floats,
+    unit: float,
+    direction: float,
+    maximise: bool,
+) -> Floats:
+    """Return a bound of the best value of every node, below (direction -1) or above it (1), those of the sinks behind them.
+
+    `known` is one that is known, ``[n]``; it leaves no worse.
+
+    `rows` are node_to_rows, row_to_branches and target, `paid` is what rows pay, the size of that and whether it is exact,
+    `order` is that of `sinks_first`, and `unit` times the number of branches and 8 more the relative error of a drift.
+    """
+    node_to_rows, row_to_branches, target = rows
+    cost, size, exact = paid
+    n = len(node_to_rows) - 1
+    x = np.zeros(n + 2, np.float64)
+    x[:n] = known
+    x[n + 1] = 1.0
+    for i in range(n):
+        s = order[i]
+        best = -np.inf if maximise else np.inf
+        for a in range(node_to_rows[s], node_to_rows[s + 1]):
+            first, last = row_to_branches[a], row_to_branches[a + 1]
+            count = last - first
+            likeliest, least = first, first
+            for b in range(first, last):
+                likeliest = b if probability[b] > probability[likeliest] else likeliest
+                least = b if x[target[b]] < x[target[least]] else least
+            base, moved, weight = 0.0, 0.0, np.inf
+            for origin in (
+                likeliest,
+                least,
+            ):  # what the differences are taken from: the one that leaves less to rounding
+                start, drift, size_of = x[target[origin]], 0.0, size[a]
+                for b in range(first, last):
+                    step = x[target[b]] - start
+                    drift += probability[b] * step
+                    size_of += probability[b] * abs(step) + (1e-322 if step != 0.0 else 0.0)
+                if size_of < weight:
+                    base, moved, weight = start, drift, size_of
+                if least == likeliest:
+                    break
+            further = cost[a] + moved
+            doubt = 0.0
+            if weight > 0.0 and not (exact[a] and count == 1 and probability[first] == 1.0):
+                doubt = (count + 8) * unit * weight + count * 1e-322
+            total = base + further
+            back = total - base
+            lost = (base - (total - back)) + (further - back)
+            if doubt > 0.0 or lost != 0.0:
+                doubt += abs(lost)
+                total += direction * (doubt + 2.0**-51 * (abs(total) + doubt))
+            best = max(best, total) if maximise else min(best, total)
+        x[s] = max(x[s], best) if direction < 0.0 else min(x[s], best)
+    return x

@@ -2,7 +2,7 @@
 
 Under a policy a model is a Markov chain: a state's row mixes the rows of its choices. The graph of the chain decides where
 the goal is reached with probability 0 or 1, and where nothing is paid on the way; the rest is one linear system, from every
-state of which the run is absorbed. With the expected cost, a state that reaches the goal with probability below 1 has the
+state of which the run is absorbed (without cycles: one backward pass, `layered`). With the expected cost, a state that reaches the goal with probability below 1 has the
 value ∞, whatever it pays; with the reward gathered until a goal that must be reached it has the value -∞.
 
 A state of which the policy says nothing must not be reached. Where it is not reached from the initial states, it and all
@@ -24,6 +24,7 @@ from ratherthan.model.mdp import Bools, Floats
 from ratherthan.model.policy import Policy
 from ratherthan.solve.certify import Parts, Tight, chain_bounds, never_falls, never_rises, outward
 from ratherthan.solve.goal import Goal, Kind
+from ratherthan.solve.layered import layered_bounds
 from ratherthan.solve.linear import solve_chain
 from ratherthan.solve.rewards import SMALLEST
 from ratherthan.solve.sweeps import Sweeps, sweep_from_below, swept_between, upper_vector
@@ -194,17 +195,23 @@ def _computed(
         discount=goal.discount,
     )
     least, most = _widest(goal, system.nodes)
+    plain = layered_bounds(system, goal.maximise, most=np.inf if goal.counts_cost else 1.0)
+    if plain is not None and plain.narrow:
+        return plain
+    if plain is not None:
+        least, most = plain.lower, plain.upper
     if guess is not None:
         parts, margin = Parts(guess.high[open_], guess.low[open_]), guess.margin[open_]
         if never_falls(system, *parts, -margin) and never_rises(system, *parts, margin):
             lower, upper = outward(parts, margin, signed=system.signed)
-            return np.clip(parts.high + parts.low, lower, upper), lower, np.minimum(upper, most)
+            lower, upper = np.maximum(lower, least), np.minimum(upper, most)
+            return np.clip(parts.high + parts.low, lower, upper), lower, upper
     solved = solve_chain(system)
     if solved is None:
         return _swept(goal, system, (least, most))
     tight = Tight(Parts(solved.high, solved.low), np.arange(system.nodes), solved.inverse, solved.scale)
     proved = chain_bounds(system, tight)
-    lower = least if proved[0] is None else proved[0]
+    lower = least if proved[0] is None else np.maximum(proved[0], least)
     upper = most if proved[1] is None else np.minimum(proved[1], most)
     return np.clip(solved.high + solved.low, lower, upper), lower, upper
 

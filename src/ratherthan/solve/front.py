@@ -4,7 +4,9 @@ What all policies can attain is a convex polygon (of all mixtures of plans), and
 are the vertices of its lower left border. *Search by chords* (Cohon 1978; Aneja and Nair 1979): begin with the least of either
 cost. For two neighbouring points a, b, solve with the weights that make a and b equally good, w = (a₂ - b₂, b₁ - a₁). Either the
 best is below the chord, and is a new point between them; or it is not, and the chord is part of the border: nothing lies
-below it, which the lower bound of that solve proves, up to the tolerance. Each solve finds a point or closes a chord, so that n
+below it, which the lower bound of that solve proves, up to the tolerance. The two ends with which it begins are best for one cost
+alone, and another point may be as good in that and better in the other: it takes the end's place. Where it does so at
+both ends it is the whole border. Each solve finds a point or closes a chord, so that n
 points take at most 2 n solves. Points within a relative 1e-6 of a chord count as on it.
 
 In f₁ + W f₂ the plan is best for every W between the slopes of the chords beside it.
@@ -41,6 +43,10 @@ class Point:
     second: float
     low: float
     high: float
+
+    def replaces(self, other: Point) -> None:
+        """Take the weights of a point that this one is as good as in one cost and better than in the other, wherever that is best."""
+        self.low, self.high = min(self.low, other.low), max(self.high, other.high)
 
 
 @dataclass(kw_only=True, eq=False)
@@ -131,11 +137,7 @@ class Front:
         here = first * point.first + second * point.second
         chord_level = min(first * p.first + second * p.second for p in (left, right))
         doubt = first * self._doubt(0, left, right, point) + second * self._doubt(1, left, right, point)
-        inside = left.first < point.first < right.first and right.second < point.second < left.second
-        corner = (
-            chord is self.chords[0] and point.first <= left.first and right.second < point.second < left.second
-        ) or (chord is self.chords[-1] and point.second <= right.second and left.first < point.first < right.first)
-        if here < chord_level - FLAT * (first * across + second * down) - doubt and (inside or corner):
+        if here < chord_level - FLAT * (first * across + second * down) - doubt and self._fits(chord, point):
             self._part(chord, point)
         else:
             chord.closed, chord.least = True, point.found.least / first
@@ -143,19 +145,43 @@ class Front:
                 left.high = max(left.high, chord.weight)
                 right.low = min(right.low, chord.weight)
 
+    def _instead(self, chord: Chord, point: Point) -> tuple[bool, bool]:
+        """Return whether a point below a chord can take the place of its left end, and of its right end.
+
+        Only the ends of the border can be beaten so: each of them is best for one cost, and perhaps not for the other. An end
+        in between is best for a weighting of both.
+        """
+        left, right = chord.left, chord.right
+        as_near = point.first <= left.first or equal(point.first, left.first, self._doubt(0, left, point))
+        as_low = point.second <= right.second or equal(point.second, right.second, self._doubt(1, right, point))
+        return (
+            chord is self.chords[0] and as_near and point.second < left.second,
+            chord is self.chords[-1] and as_low and point.first < right.first,
+        )
+
+    def _fits(self, chord: Chord, point: Point) -> bool:
+        """Return whether a point is between the ends of a chord, or in the place of one or both of them."""
+        for_left, for_right = self._instead(chord, point)
+        after = for_left or (chord.left.first < point.first and point.second < chord.left.second)
+        before = for_right or (point.first < chord.right.first and chord.right.second < point.second)
+        return after and before
+
     def _part(self, chord: Chord, point: Point) -> None:
-        """Put a point between the ends of a chord, or in the place of an end that it is better than."""
+        """Put a point between the ends of a chord, or in the place of those that it is better than."""
         at = self.chords.index(chord)
+        for_left, for_right = self._instead(chord, point)
         parts = []
-        if chord.left.first < point.first:
+        if for_left:
+            point.replaces(chord.left)
+        else:
             parts.append(Chord(left=chord.left, right=point))
+        if for_right:
+            point.replaces(chord.right)
         else:
-            point.low = 0.0
-        if chord.right.second < point.second:
             parts.append(Chord(left=point, right=chord.right))
-        else:
-            point.high = np.inf
         self.chords[at : at + 1] = parts
+        if not self.chords:
+            self.alone = point
 
     def border(self) -> list[Point]:
         """Return the vertices that are known, from left to right: without ends that another is as good as, or on a chord."""
@@ -164,7 +190,7 @@ class Front:
         doubts = [self._doubt(which, *points) for which in (0, 1)]
         for point in points:
             while kept and equal(kept[-1].first, point.first, doubts[0]):
-                point.low = min(point.low, kept.pop().low)  # as good in the first, better in the second
+                point.replaces(kept.pop())  # as good in the first, better in the second
             if kept and equal(kept[-1].second, point.second, doubts[1]):
                 kept[-1].high = max(kept[-1].high, point.high)
                 continue

@@ -14,8 +14,11 @@ from ratherthan.solve.certify import Parts, Tight, chain_margin, never_falls, ne
 from ratherthan.solve.chain import Evaluated, Guess, chain_of, evaluated, nodes_of
 from ratherthan.solve.gathering import loops_in_doubt, most_reward
 from ratherthan.solve.goal import Goal, Kind, Task
+from ratherthan.solve.layered import Layered, layered_bounds, swept_bounds
 from ratherthan.solve.levelling import levelled, raised, without_cancelling
-from ratherthan.solve.policy_iteration import Found, PolicyIteration, iterate_policies
+from ratherthan.solve.linear import Method as LinearMethod
+from ratherthan.solve.linear import Solved
+from ratherthan.solve.policy_iteration import Found, PolicyIteration, iterate_policies, least_rows
 from ratherthan.solve.sweeps import Sweeps, Swept, arriving_rows, sweep_from_below, swept_between, upper_vector
 from ratherthan.solve.system import System, build_system, drift, rows_of
 from ratherthan.solve.tied import first_tied, fixed_best, tied_choices
@@ -28,6 +31,7 @@ Nodes = npt.NDArray[np.int64]
 
 TIES = np.array([1e-10, 1e-13, -np.inf])
 """Relative tolerances within which choices are tied, the next where the policy loses; at last the solver's rows alone."""
+NO_METHOD = LinearMethod(lambda _: None)
 LOSS = 1e-10
 """Up to which relative loss a policy counts as attaining the optimum."""
 
@@ -72,7 +76,8 @@ def _optimum(task: Task, method: Method | None, progress: Progress | None, fines
         attained = evaluated(goal, chain_of(goal, Policy(choice=choice)))
         return Optimum(task.fixed, task.fixed, task.fixed, choice, tied, attained, "graph search", 0, 0.0, task)
     node, core, whole = _systems(task)
-    quick = _windowed(task, core, whole, progress) if method is None and finest == 0 else None
+    plain = None if core is not whole or loops_in_doubt(task) else _layered_bounds(task, core)
+    quick = _at_once(task, (core, whole), node, (plain, finest), progress) if method is None else None
     if quick is not None:
         return quick
     found = None
@@ -93,6 +98,7 @@ def _optimum(task: Task, method: Method | None, progress: Progress | None, fines
         if level is not None:
             return _on_level(task, level, method, progress, finest)
     values, lower, upper = _joined(task, found.values[node[task.open]], proved, attained)
+    values, lower, upper = _tightened(task, whole, plain, (values, lower, upper))
     if proved is None and goal.kind is Kind.REWARD:
         apart = without_cancelling(task, tied)
         if apart is not None:  # what cannot come there may be proved all the same
@@ -101,6 +107,58 @@ def _optimum(task: Task, method: Method | None, progress: Progress | None, fines
     residual = _residual(core, goal.maximise, found.solved.high, found.solved.low)
     tied = fixed_best(task) | tied & task.open[goal.index.choice_to_state]
     return Optimum(values, lower, upper, choice, tied, attained, found.engine, found.rounds + solves, residual, task)
+
+
+def _at_once(
+    task: Task,
+    systems: tuple[System, System],
+    node: Nodes,
+    layered: tuple[Layered | None, int],
+    progress: Progress | None,
+) -> Optimum | None:
+    """Return the optimum by windowed sweeps or by one backward pass, None where neither suits."""
+    (core, whole), (plain, finest) = systems, layered
+    quick = _windowed(task, core, whole, progress) if finest == 0 else None
+    if quick is None and plain is not None and plain.narrow:
+        return _layered(task, core, node, plain, finest)
+    return quick
+
+
+def _layered_bounds(task: Task, core: System) -> Layered | None:
+    """Return the bounds of one backward pass, None where there is a cycle."""
+    return layered_bounds(core, task.goal.maximise, most=np.inf if task.goal.counts_cost else 1.0)
+
+
+def _tightened(
+    task: Task, whole: System, plain: Layered | None, found: tuple[Floats, Floats, Floats]
+) -> tuple[Floats, Floats, Floats]:
+    """Return values and bounds on all states, the better of two bounds where a pass has others."""
+    values, lower, upper = found
+    own = task.open
+    if plain is not None:
+        lower[own], upper[own] = np.maximum(lower[own], plain.lower), np.minimum(upper[own], plain.upper)
+    elif task.goal.signed:
+        lower[own], upper[own] = swept_bounds(whole, lower[own], upper[own], task.goal.maximise)
+    return np.clip(values, lower, upper), lower, upper
+
+
+def _layered(task: Task, core: System, node: Nodes, plain: Layered, finest: int) -> Optimum:
+    """Return the optimum of a task without cycles, of which one backward pass has proved the bounds."""
+    goal, own = task.goal, node[task.open]
+    total, _ = drift(core, plain.values)
+    rows = least_rows(core, -total if goal.maximise else total)
+    solved = Solved(plain.values, np.zeros(core.nodes), lambda right: np.full_like(right, np.nan), NO_METHOD, 0.0)
+    found = Found(solved=solved, rows=rows, rounds=1, converged=True, engine="one backward pass")
+    choice, tied, attained, solves = _attaining(task, core, node, found, finest)
+    values, lower, upper = (task.fixed.copy() for _ in range(3))
+    for whole, part in zip((values, lower, upper), plain, strict=True):
+        whole[task.open] = part[own]
+    side, better = (lower, np.maximum) if goal.maximise else (upper, np.minimum)
+    side[task.open] = better(side, attained.lower if goal.maximise else attained.upper)[task.open]
+    values = np.clip(values, lower, upper)
+    residual = _residual(core, goal.maximise, plain.values)
+    tied = fixed_best(task) | tied & task.open[goal.index.choice_to_state]
+    return Optimum(values, lower, upper, choice, tied, attained, found.engine, 1 + solves, residual, task)
 
 
 def _windowed(task: Task, core: System, whole: System, progress: Progress | None) -> Optimum | None:

@@ -17,15 +17,18 @@ E. A. Feinberg, A. Shwartz, Constrained Discounted Dynamic Programming, Math. Op
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ratherthan.errors import QuestionError
+from ratherthan.model.further import further_objective
 from ratherthan.model.mdp import Floats
-from ratherthan.model.objective import Level, Objective
+from ratherthan.model.objective import Level, Objective, Threshold, levels_of
 from ratherthan.model.problem import Problem
+from ratherthan.model.property import choose_objective
 from ratherthan.solve.bounded import Bounded, within
 from ratherthan.solve.front import Front, Point
 from ratherthan.solve.plan import Plan, partings
@@ -94,7 +97,7 @@ class Tradeoffs:
 
 def tradeoffs(
     problem: Problem,
-    objectives: Sequence[Objective],
+    objectives: Sequence[Objective | str],
     *,
     bound: Mapping[str, float] | None = None,
     most: int = MOST,
@@ -107,7 +110,8 @@ def tradeoffs(
     problem : Problem
         With one initial state.
     objectives : sequence of objectives
-        Two or more expected totals of different rewards until the same goal (or discounted alike).
+        Two or more expected totals of different rewards until the same goal (or discounted alike); or their texts, their names
+        in the source, or after the first one names of rewards, which mean the least of each until the same goal.
     bound : mapping of str to float, optional
         The name of one reward and the most it may be (the least, where it is gathered): also return the best
         plan for the first of the other objectives within the bound. Steps are called "steps".
@@ -123,7 +127,8 @@ def tradeoffs(
     Raises
     ------
     QuestionError
-        For fewer than two objectives, two about one reward, several initial states, or a bound that is on none of them.
+        For fewer than two objectives, two about one reward, what is no objective, several initial states, or a bound that is
+        on none of them or no number.
     NotExplainableError
         For objectives that are no totals until one goal.
     PropertyError
@@ -137,9 +142,9 @@ def tradeoffs(
     >>> [plan.values.round(2).tolist() for plan in tradeoffs(problem, wishes).plans]
     [[8.75, 2.0], [13.75, 0.2], [16.25, 0.0]]
     """
-    if most < 2:
-        raise QuestionError(f"At least two plans must be wanted, got {most}.")
-    weighing = weighing_of(problem, objectives, progress)
+    if not isinstance(most, int | np.integer) or most < 2:
+        raise QuestionError(f"At least two plans must be wanted, got {most!r}.")
+    weighing = weighing_of(problem, _read(problem, objectives), progress)
     limited = _bound(weighing, bound)
     found = _Gathered(weighing=weighing)
     for other in range(1, len(weighing.objectives)):
@@ -160,11 +165,32 @@ def tradeoffs(
     )
 
 
+def _read(problem: Problem, wishes: Sequence[Objective | str]) -> list[Objective]:
+    """Return the objectives, read where they are texts."""
+    if isinstance(wishes, str) or not isinstance(wishes, Iterable):
+        raise QuestionError(f"A trade-off must be between several objectives or their texts, got {wishes!r}.")
+    found: list[Objective] = []
+    for text in wishes:
+        wish: object = text
+        if isinstance(text, str):
+            wish = further_objective(problem, text, levels_of(found[0])) if found else choose_objective(problem, text)
+        if isinstance(wish, Threshold):
+            raise QuestionError(f"A trade-off must be between best values (=?), got '{wish.text}'.", text=wish.text)
+        if not isinstance(wish, Objective):
+            raise QuestionError(f"A trade-off must be between objectives or their texts, got {wish!r}.")
+        found.append(wish)
+    return found
+
+
 def _bound(weighing: Weighing, bound: Mapping[str, float] | None) -> tuple[tuple[int, int], float] | None:
     """Return the pair of objectives, the second one bounded, and the bound."""
     if bound is None:
         return None
     names = [called(objective) for objective in weighing.objectives]
+    if not isinstance(bound, Mapping):
+        raise QuestionError(
+            f"A bound must be the name of a reward with a number, such as {{'{names[-1]}': 1}}, got {bound!r}."
+        )
     if len(bound) != 1:
         raise QuestionError(f"One objective can be bounded at a time, got {len(bound)}. Weigh the others.")
     name, value = next(iter(bound.items()))
@@ -172,8 +198,9 @@ def _bound(weighing: Weighing, bound: Mapping[str, float] | None) -> tuple[tuple
         raise QuestionError(
             f"A bound must be on one of the objectives, {', '.join(names)}, got '{name}'.", objective=name
         )
-    if not np.isfinite(value):
-        raise QuestionError(f"A bound must be a finite number, got {value} for '{name}'.", objective=name)
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool | np.complexfloating)
+    if not number or not abs(value) <= sys.float_info.max:
+        raise QuestionError(f"A bound must be a finite number, got {value!r} for '{name}'.", objective=name)
     which = names.index(name)
     return (0 if which else 1, which), float(value)
 

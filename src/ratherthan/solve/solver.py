@@ -2,7 +2,7 @@
 
 The straight line: what is wanted is resolved on the model (`goal`), for a mission on the product with what must be remembered;
 the graph decides what it can (`task`); the rest becomes a system with end components collapsed (`system`); policy iteration
-solves it (`policy_iteration`); of the choices that cannot be told from the best the policy takes the first listed with which it
+solves it (`policy_iteration`), or one backward pass where it has no cycles (`layered`); of the choices that cannot be told from the best the policy takes the first listed with which it
 arrives (`tied`), and is evaluated (`chain`); the bounds are proved (`certify`). Several objectives in order go this way one
 after the other, each on the choices that the ones before leave (`lexicographic`).
 """

@@ -15,6 +15,10 @@ on which costs are positive, never on a computed number. With G the goal:
 * *Least probability.* 0 where G can be avoided, 1 where it cannot be missed. In the rest no end component is left: where a
   run can stay for ever, G is avoided.
 
+* *Least probability, where the run must end.* Of several objectives the first may demand that the run comes to an end; then to stay
+  for ever is no way to avoid G. 0 where the other ends can be reached with probability 1 without G, 1 where they cannot be reached
+  at all. In the rest end components are collapsed, as for costs: every policy that counts leaves them.
+
 * *Sums of rewards of either sign, and discounted sums*: see `gathering`.
 
 Objectives whose rewards are all of the sign against their direction are mirrored (`goal`): the most reward, where every
@@ -31,14 +35,25 @@ from __future__ import annotations
 import numpy as np
 
 from ratherthan.model import graph
+from ratherthan.model.mdp import Bools
 from ratherthan.solve.gathering import discounted, most_reward
 from ratherthan.solve.goal import Goal, Kind, Task, goal_of, objective_of
 
 __all__ = ["Goal", "Task", "goal_of", "objective_of", "task_of"]
 
 
-def task_of(goal: Goal) -> Task:
-    """Return the task that a goal sets: what the graph decides, and what is left."""
+def task_of(goal: Goal, must_end: Bools | None = None) -> Task:
+    """Return the task that a goal sets: what the graph decides, and what is left.
+
+    Parameters
+    ----------
+    goal : Goal
+    must_end : array of bool, ``[S]``, optional
+        For a least probability: where only policies count with which the run ends for sure. No choice leads out of it but to an
+        end, and there is such a policy.
+    """
+    if must_end is not None and goal.kind is Kind.PROBABILITY and not goal.maximise:
+        return _least_likely_ending(goal, must_end)
     if goal.kind is Kind.DISCOUNTED:
         return discounted(goal)
     if goal.kind is Kind.REWARD:
@@ -136,4 +151,29 @@ def _least_likely(goal: Goal) -> Task:
         internal=np.zeros(index.choices, dtype=np.bool_),
         arriving=np.zeros(index.states, dtype=np.bool_),
         attaining=np.zeros(index.choices, dtype=np.bool_),
+    )
+
+
+def _least_likely_ending(goal: Goal, must_end: Bools) -> Task:
+    index, target, running = goal.index, goal.target, goal.running
+    safe = ~target & ~running
+    must = must_end & running
+    free = must & graph.surely_reach(index, safe, must)
+    avoiding = graph.can_avoid(index, target | must & ~free, running & ~free)
+    sure = ~graph.can_reach(index, avoiding, running)
+    open_ = ~avoiding & ~sure
+    component, internal = graph.end_components(index, open_, open_[index.choice_to_state])
+    staying = graph.first_listed(index, graph.all_branches_in(index, avoiding))
+    saving = free[index.choice_to_state] & graph.all_branches_in(index, free | safe)
+    return Task(
+        goal=goal,
+        fixed=np.where(sure, 1.0, 0.0),
+        open=open_,
+        allowed=open_[index.choice_to_state],
+        component=component,
+        internal=internal,
+        arriving=must,
+        attaining=saving | (sure & must)[index.choice_to_state],
+        elsewhere=np.where(avoiding & running, staying, index.state_to_choices[:-1]),
+        can_arrive=np.ones(index.states, dtype=np.bool_),
     )

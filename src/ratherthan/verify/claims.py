@@ -20,7 +20,7 @@ from ratherthan.explain.question import Question
 from ratherthan.verify.frame import Frame
 from ratherthan.verify.interval import Interval, Order, order
 from ratherthan.verify.levels import Levels
-from ratherthan.verify.measure import Measures
+from ratherthan.verify.measure import GROSS, Measures
 from ratherthan.verify.numbers import disagreement, vague
 from ratherthan.verify.predicates import (
     ABOUT_COUNTS,
@@ -98,7 +98,7 @@ class ClaimCheck:
     def _number(self, claimed: Interval, band: Band, state: int) -> str | None:
         """Return how a value of a state disagrees with the model."""
         silent = band.silent is not None and bool(band.silent[state])
-        return disagreement(claimed, band[state], self.levels, self.measures.size, silent=silent)
+        return disagreement(claimed, band[state], self.levels, self.measures, silent=silent)
 
     def _evidence(self, claim: Claim) -> str | None:
         """Return what is wrong with a claim's evidence, whatever it claims."""
@@ -151,7 +151,7 @@ class ClaimCheck:
                     row.number,
                     self.measures.number(row.choice),
                     self.levels,
-                    self.measures.size,
+                    self.measures,
                     silent=self.measures.silent(row.choice),
                 )
                 fate, known = self.measures.fate(row.choice), self.measures.decided(row.choice)
@@ -166,20 +166,23 @@ class ClaimCheck:
         return None
 
     def _vague(self, claim: Claim) -> bool:
-        """Return whether less is known here of some number than the evidence says."""
+        """Return whether less is known here of some number than the evidence says, or much more."""
+        tallies = [row for row in (claim.evidence.taken, *claim.evidence.others) if isinstance(row, Tally)]
+        if not all(self.levels.counts.count(row.choice)[1].contains(row) for row in tallies):
+            return True
         rows = [row for row in (claim.evidence.taken, *claim.evidence.others) if isinstance(row, Measured)]
         pairs = [(self.measures.number(row.choice), row.number) for row in rows]
         for state, optimum, followed in claim.evidence.follows:
             pairs += [(self.best[state], optimum), (self.followed[state], followed)]
-        return any(vague(told, own, self.measures.size) for own, told in pairs)
+        return any(vague(told, own, self.levels, self.measures) for own, told in pairs)
 
     def _tally(self, row: Tally) -> str | None:
-        own, admitted = self.levels.counts.count(row.choice)
+        own, _, excused = self.levels.counts.count(row.choice)
         if not (row.lower <= row.upper and own.meets(row)):
             return (
                 f"'{row.action}' leaves {own.lower:g} to {own.upper:g} decisions open, got {row.lower} to {row.upper}"
             )
-        if row.lower < admitted.lower or row.upper > admitted.upper:
+        if not excused.contains(row):
             return f"the count of '{row.action}' is known better than {row.lower} to {row.upper}"
         return None
 
@@ -211,8 +214,8 @@ class ClaimCheck:
         own = self._judged(claim, self._as_known(claim))
         if own is False and all(map(self.measures.decided, self._choices(claim))):
             return "it does not hold on the model", False
-        own = own or None
-        return self._left_out(claim), own is None
+        flaw, is_open = self._left_out(claim)
+        return flaw, is_open or own is not True
 
     def _choices(self, claim: Claim) -> list[int]:
         return [row.choice for row in (claim.evidence.taken, *claim.evidence.others)]
@@ -280,10 +283,11 @@ class ClaimCheck:
         found = order(optimum, followed, self.asked.tolerance)
         return None if found is Order.OPEN else found is Order.EQUAL
 
-    def _left_out(self, claim: Claim) -> str | None:
-        """Return which alternative a claim about some alternatives should name too."""
+    def _left_out(self, claim: Claim) -> tuple[str | None, bool]:
+        """Return which alternative a claim about some alternatives must name too, and whether there is one it should name."""
         if claim.claim not in SOME:
-            return None
+            return None, False
+        is_open, least = False, self.measures.coarse(self.levels.slack) / GROSS
         named = {row.choice for row in claim.evidence.others}
         own = self.measures.number(self.step.choice)
         for choice, number in self.measures.numbers(self.step.state).items():
@@ -293,7 +297,9 @@ class ClaimCheck:
                 belongs = self.measures.fate(choice) is not None
             else:
                 clear = order(own, number, 10 * self.asked.tolerance)
-                belongs = clear in (Order.GREATER, Order.LESS) and self._relation(own, number) == "worse"
+                known = clear in (Order.GREATER, Order.LESS) and self._relation(own, number) == "worse"
+                belongs = known and self._relation(own.widened(GROSS, least), number.widened(GROSS, least)) == "worse"
+                is_open |= known and not belongs
             if belongs:
-                return f"it leaves out '{self.frame.mdp.action_name(choice)}'"
-        return None
+                return f"it leaves out '{self.frame.mdp.action_name(choice)}'", False
+        return None, is_open

@@ -39,7 +39,8 @@ class ClosingCheck:
         else:
             untold = sorted({step.state for step in told.steps if step.critical is False})
             reason, is_open = self._untold(untold)
-            reason = reason or self._off_route()
+            off, vague = self._off_route()
+            reason, is_open = reason or off, is_open or vague
         verdict = Verdict.FAILS if reason else Verdict.UNDECIDED if is_open else Verdict.HOLDS
         return Check(what="closing", where="", verdict=verdict, reason=reason or "")
 
@@ -56,7 +57,8 @@ class ClosingCheck:
             return ("not all other decisions are equivalent" if False in equal else None), None in equal
         if closing.printed != (alpha > 0 and closing.largest_difference is not None):
             return "it must be printed exactly where the largest difference is known and asked for", False
-        if False not in equal and None not in equal and self.levels.slack < math.inf:
+        alike = False not in equal and None not in equal and self.levels.slack < math.inf
+        if alike and not self._faint(closing.largest_difference, untold):
             return "all other decisions are equivalent", False
         spreads = [self.levels.measures[0].difference(state) for state in untold]
         if closing.largest_difference is None:
@@ -65,11 +67,28 @@ class ClosingCheck:
             return ("the largest difference is known" if known else None), False
         low = max(0.0, *(high.lower - low.upper for high, low in spreads))
         most = max(high.upper - low.lower for high, low in spreads)
-        size = self.levels.measures[0].size
-        near = 2e-6 * max(size, *(abs(number.upper) for spread in spreads for number in spread))
-        if not low - near <= closing.largest_difference <= most + near:
+        near, coarse = 2e-6 * max(self.levels.measures[0].size, self._size(untold)), self._coarse(untold)
+        if not low - near <= closing.largest_difference <= most + max(near, coarse):
             return f"the largest difference lies in [{low:.10g}, {most:.10g}], got {closing.largest_difference}", False
-        return None, False
+        return None, alike or not low - near <= closing.largest_difference <= most + near
+
+    def _size(self, states: list[int]) -> float:
+        """Return the largest finite number of some states."""
+        numbers = [number for state in states for number in self.levels.measures[0].difference(state)]
+        return max((abs(number.upper) for number in numbers if number.finite), default=0.0)
+
+    def _coarse(self, states: list[int]) -> float:
+        """Return how much the difference of two numbers of some states may be blurred without being a forgery."""
+        blur = self.levels.measures[0].coarse(self.levels.slack)
+        return (
+            2.0 * max(self.levels.most_slack * self._size(states), blur)
+            if math.isfinite(self.levels.slack)
+            else math.inf
+        )
+
+    def _faint(self, difference: float | None, untold: list[int]) -> bool:
+        """Return whether a difference may come of numbers that are not known well: so little that nobody could tell it from 0."""
+        return difference is not None and difference <= self._coarse(untold)
 
     def _equivalent(self, state: int) -> bool | None:
         """Return whether all choices of a state have finite and equal numbers at every level that has not ended there."""
@@ -89,17 +108,19 @@ class ClosingCheck:
             return False
         return None if Order.OPEN in orders or not all(number.finite for number in numbers) else True
 
-    def _off_route(self) -> str | None:
-        """Return what is wrong with the number of critical states off the route."""
+    def _off_route(self) -> tuple[str | None, bool]:
+        """Return what is wrong with the number of critical states off the route, and whether it is known less well than it could."""
         closing = self.told.closing
         off = self.reached.copy()
         off[list(self.told.route)] = False
-        (sure, maybe), (must, may) = self.levels.critical, self.levels.admitted
-        known = int((must & off).sum()), int((maybe & off).sum())
-        reach = int((sure & off).sum()), int((may & off).sum())
+        sure, maybe = self.levels.critical
         certain, possible = closing.off_route, closing.off_route + closing.off_route_open
-        if known[0] <= certain <= known[1] and reach[0] <= possible <= reach[1]:
-            return None
-        return (
-            f"{known[0]} to {known[1]} decisions off the route matter, got {certain}, and {closing.off_route_open} open"
-        )
+        fitting = []
+        for must, may in (self.levels.admitted, self.levels.excused):
+            known = int((must & off).sum()), int((maybe & off).sum())
+            reach = int((sure & off).sum()), int((may & off).sum())
+            fitting.append(known[0] <= certain <= known[1] and reach[0] <= possible <= reach[1])
+        if any(fitting):
+            return None, not fitting[0]
+        least, most, open_ = known[0], known[1], closing.off_route_open
+        return f"{least} to {most} decisions off the route matter, got {certain}, and {open_} open", False

@@ -43,8 +43,8 @@ class Counts:
         Of the first level.
     band : Band
         Of the values that count there.
-    critical, admitted : Critical
-        What is critical, and what whoever made the explanation may have known of it.
+    critical, admitted, excused : Critical
+        What is critical, what whoever made the explanation should have known of it, and what he must have known.
     tolerance : float
     tree : Tree
     """
@@ -53,24 +53,25 @@ class Counts:
     band: Band
     critical: Critical
     admitted: Critical
+    excused: Critical
     tolerance: float
     tree: Tree
 
-    def count(self, choice: int) -> tuple[Bounds, Bounds]:
-        """Return ε of a choice, and within which bounds its bounds must lie in an explanation."""
+    def count(self, choice: int) -> tuple[Bounds, Bounds, Bounds]:
+        """Return ε of a choice, and within which bounds its bounds should lie in an explanation, and must lie."""
         if choice not in self._counts:
             least = self._search(choice, sure=True)
             most = self._search(choice, sure=False) if self.tree.toward_goal else least
             weight = np.diff(self.frame.mdp.state_to_choices)
-            own, admitted = (
+            own, admitted, excused = (
                 Bounds(float((weight * found.sure)[least].sum()), float((weight * found.maybe)[most].sum()))
-                for found in (self.critical, self.admitted)
+                for found in (self.critical, self.admitted, self.excused)
             )
-            self._counts[choice] = own, admitted
+            self._counts[choice] = own, admitted, excused
         return self._counts[choice]
 
     @cached_property
-    def _counts(self) -> dict[int, tuple[Bounds, Bounds]]:
+    def _counts(self) -> dict[int, tuple[Bounds, Bounds, Bounds]]:
         return {}
 
     def _search(self, choice: int, *, sure: bool) -> Bools:

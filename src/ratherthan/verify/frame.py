@@ -59,6 +59,8 @@ class Frame:
         without a discount, no reward is negative.
     discount : float
         γ; 1 where all rewards count alike.
+    ending : bool
+        Whether only policies count under which a run surely ends, wherever that is.
     permitted : array of bool, ``[C]``, optional
         The choices that may be taken; None for all.
     """
@@ -70,6 +72,7 @@ class Frame:
     prices: Prices | None = None
     demanding: bool = False
     discount: float = 1.0
+    ending: bool = False
     permitted: Bools | None = None  # [C]
 
     @cached_property

@@ -6,7 +6,8 @@ has ended, or where the largest probability it asked for has become 0; a level m
 
 How nearly equal two choices must be to be tied is up to whoever solved it, between rounding and the tolerance of comparisons.
 Where that matters, the optimum lies between that of the choices that are tied for sure and that of those that may be: more
-choices are never worse. (A bound that needs this is wide, and what rests on it is left undecided.)
+choices are never worse. (A bound that needs this is wide, and what rests on it is left undecided.) Nor do all policies that take
+tied choices attain what these promise: see `attained`.
 """
 
 from __future__ import annotations
@@ -18,15 +19,16 @@ import numpy as np
 
 from ratherthan.explain.question import Question
 from ratherthan.model.mdp import Bools, Floats
-from ratherthan.model.objective import Mission, Objective, ReachAvoid, levels_of
+from ratherthan.model.objective import Objective, levels_of
 from ratherthan.model.problem import Problem
 from ratherthan.verify.aims import frame_of
+from ratherthan.verify.attained import attaining, hopeless_in, leading_to, must_end, over_of, unbounded_in, without
 from ratherthan.verify.candidates import Budget
 from ratherthan.verify.counts import Counts, Tree
 from ratherthan.verify.frame import Frame
 from ratherthan.verify.groups import Compared, Critical, compared, critical, extremes
 from ratherthan.verify.interval import Ends
-from ratherthan.verify.measure import Measures
+from ratherthan.verify.measure import GROSS, Measures
 from ratherthan.verify.values import Band, following, optimum
 
 __all__ = ["Levels", "levels_on"]
@@ -74,12 +76,21 @@ class Levels:
     @cached_property
     def best(self) -> tuple[Band, ...]:
         """Bounds of the optimum ρ of each level."""
-        found: list[Band] = []
-        tied = Compared(self._every, self._every)
-        for k, frame in enumerate(self.frames):
-            if k:
-                tied = self._tied(self.frames[k - 1], found[-1], tied)
-            found.append(self._between(frame, tied))
+        found = [self._between(self.first, Compared(self._every, self._every))]
+        tied = self._tied(self.first, found[0], Compared(self._every, self._every))
+        lost = unbounded_in(self.first, found[0])
+        for k, frame in enumerate(self.frames[1:], start=1):
+            lost = leading_to(self.first, lost, tied.maybe)
+            band = self._between(must_end(self.first, frame), tied)
+            worse = np.zeros_like(lost)
+            if not self.attainable(k):
+                attained = attaining(self.frames[: k + 1], self._tied(frame, band, tied).sure) & ~lost
+                hopeless = np.isinf(found[0].lower) | np.isinf(found[0].upper)
+                lost, worse = lost | (~attained & hopeless), ~attained | (unbounded_in(frame, band) & ~lost)
+            known = ~frame.running | hopeless_in(frame, band)
+            found.append(without(band, worse & ~known, lost & ~known, maximise=frame.maximise))
+            tied = self._tied(frame, found[-1], tied)
+            lost |= worse | unbounded_in(frame, band)
         return tuple(found)
 
     @property
@@ -92,8 +103,11 @@ class Levels:
         if (tied.sure == tied.maybe).all():
             return most
         least = optimum(replace(frame, permitted=tied.sure), self.budget)
-        worse, better = (least, most) if frame.maximise else (most, least)
-        return Band(lower=np.minimum(worse.lower, better.lower), upper=np.maximum(worse.upper, better.upper))
+        low, high = np.minimum(least.lower, most.lower), np.maximum(least.upper, most.upper)
+        offered = np.zeros(frame.mdp.states, dtype=np.bool_)
+        offered[frame.row_state[tied.sure]] = True
+        stuck = leading_to(frame, ~offered & frame.running, tied.maybe)
+        return without(Band(lower=low, upper=high), stuck & frame.running, stuck & False, maximise=frame.maximise)
 
     def _tied(self, frame: Frame, band: Band, before: Compared) -> Compared:
         """Return which of the choices tied so far are tied at a level, too, ``[C]`` each."""
@@ -194,13 +208,26 @@ class Levels:
         """Which states are critical."""
         return critical(self.frames, self._ends, self.asked.alpha, self.asked.tolerance)
 
+    @property
+    def most_slack(self) -> float:
+        """By which share of itself a number may be less well known before it is taken for forged."""
+        return max(self.slack, GROSS)
+
     @cached_property
     def admitted(self) -> Critical:
-        """Which states whoever made the explanation must know to be critical, and which he may have left open."""
+        """Which states whoever made the explanation should know to be critical, and which he may have left open."""
+        return self._known_to([measures.widened(self.slack) for measures in self.measures])
+
+    @cached_property
+    def excused(self) -> Critical:
+        """Likewise, if the numbers were known as little as they may be: what he must know, and what he may have left open."""
+        return self._known_to([measures.blurred(self.slack) for measures in self.measures])
+
+    def _known_to(self, ends: list[Ends]) -> Critical:
+        """Return what is critical to whom the numbers are known so well."""
         if np.isinf(self.slack):
             several = (np.diff(self.first.mdp.state_to_choices) > 1) & self.first.running
             return Critical(np.zeros_like(several), several)
-        ends = [measures.widened(self.slack) for measures in self.measures]
         return critical(self.frames, ends, self.asked.alpha, self.asked.tolerance)
 
     def is_critical(self, state: int) -> bool | None:
@@ -215,6 +242,7 @@ class Levels:
             band=self.measures[0].band,
             critical=self.critical,
             admitted=self.admitted,
+            excused=self.excused,
             tolerance=self.asked.tolerance,
             tree=Tree(horizon=self.asked.search.horizon, toward_goal=self.asked.search.toward_goal),
         )
@@ -230,10 +258,7 @@ def levels_on(problem: Problem, objective: Objective) -> tuple[Frame, ...]:
     """
     levels = levels_of(objective)
     first = frame_of(problem, levels[0])
-    over = ~first.running
-    if isinstance(levels[0], ReachAvoid | Mission) and levels[0].maximise:
-        over = over | ~first.can_arrive
-    return (first, *(_ended(frame_of(problem, level), over) for level in levels[1:]))
+    return (first, *(_ended(frame_of(problem, level), over_of(first)) for level in levels[1:]))
 
 
 def _ended(frame: Frame, over: Bools) -> Frame:

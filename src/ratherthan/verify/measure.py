@@ -17,9 +17,13 @@ from ratherthan.verify.frame import Frame
 from ratherthan.verify.interval import Bounds, Ends, largest, smallest
 from ratherthan.verify.values import Band
 
-__all__ = ["Measures"]
+__all__ = ["GROSS", "ROUNDED", "Measures"]
 
 ROUNDING = 1.12e-16
+GROSS = 1e-4
+"""By which share of itself a number may be known less well than it can be: it is vague then, but no forgery."""
+ROUNDED = 1e-9
+"""What is less than this share of the largest number may be blurred by rounding."""
 LARGEST = float(np.finfo(np.float64).max) * (1 - 1e-12)
 """What adds up to more than the largest double is at least this."""
 
@@ -132,10 +136,27 @@ class Measures:
         number = self.number(choice)
         return number.finite or number.infinite
 
+    def coarse(self, slack: float) -> float:
+        """Return how much a number near 0 may be blurred by rounding, as those are that it was added up of."""
+        return max(slack * self.size, ROUNDED * self._scale) if np.isfinite(slack) else 0.0
+
+    @cached_property
+    def _scale(self) -> float:
+        """The largest number in sight: of the values, and of what is paid on any branch; at least 1 for probabilities."""
+        ends = np.concatenate([self.band.lower, self.band.upper, self.frame.price])
+        paid = 1.0 if self.frame.prices is None else self.frame.prices.largest
+        return float(np.abs(ends[np.isfinite(ends)]).max(initial=paid))
+
     def widened(self, slack: float) -> Ends:
         """Return the ends on which λ rests, wider by a share of the numbers; ∞ stays what it is."""
-        lower, upper = self.lambda_ends
-        return lower - self._share(lower, slack), upper + self._share(upper, slack)
+        return self._wider(slack, slack * self.size)
 
-    def _share(self, end: Floats, slack: float) -> Floats:
-        return np.where(np.isfinite(end), slack * np.maximum(np.abs(end), self.size), 0.0)
+    def blurred(self, slack: float) -> Ends:
+        """Return the same as wide as the ends may be without being a forgery."""
+        return self._wider(GROSS, self.coarse(slack))
+
+    def _wider(self, share: float, least: float) -> Ends:
+        lower, upper = (
+            np.where(np.isfinite(end), np.maximum(share * np.abs(end), least), 0.0) for end in self.lambda_ends
+        )
+        return self.lambda_ends[0] - lower, self.lambda_ends[1] + upper

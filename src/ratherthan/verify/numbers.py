@@ -6,6 +6,7 @@ import math
 
 from ratherthan.verify.interval import Bounds, Interval
 from ratherthan.verify.levels import Levels
+from ratherthan.verify.measure import GROSS, Measures
 
 __all__ = ["FAINT", "VAGUE", "disagreement", "vague"]
 
@@ -15,8 +16,10 @@ FAINT = 1e-3
 """Where signs may differ, no number need be known better than one of this share of the largest."""
 
 
-def disagreement(claimed: Interval, own: Bounds, levels: Levels, size: float, *, silent: bool) -> str | None:
+def disagreement(claimed: Interval, own: Bounds, levels: Levels, measures: Measures, *, silent: bool) -> str | None:
     """Return how a number disagrees with the model, None where it does not.
+
+    A number whose bounds are somewhat wider than they need be is only vague; one whose bounds say next to nothing is wrong.
 
     Parameters
     ----------
@@ -24,8 +27,8 @@ def disagreement(claimed: Interval, own: Bounds, levels: Levels, size: float, *,
     own : Bounds
     levels : Levels
         Of the explanation: whether its policy was given, and how well it must know its numbers.
-    size : float
-        The size of numbers where signs may differ, else 0.
+    measures : Measures
+        Which know how large numbers are here.
     silent : bool
         Whether it rests on what the policy does where it says nothing.
     """
@@ -38,21 +41,28 @@ def disagreement(claimed: Interval, own: Bounds, levels: Levels, size: float, *,
         return None  # it is said that nothing is known, as where the policy says nothing
     if silent:
         return "is not known: the policy that is listed says nothing of a state it comes to"
-    if not own.covers(claimed, levels.slack, size):
+    if not own.covers(claimed, levels.most_slack, measures.coarse(levels.slack) / GROSS):
         return f"is known better than to lie in [{claimed.lower:.12g}, {claimed.upper:.12g}]"
     return None
 
 
-def vague(claimed: Interval, own: Bounds, size: float) -> bool:
-    """Return whether a number is not confirmed as it is told: known too little here, or told too far from what is known.
+def vague(claimed: Interval, own: Bounds, levels: Levels, measures: Measures) -> bool:
+    """Return whether a number is not confirmed as it is told: known too little here or there, or too far from what is known.
 
     Parameters
     ----------
-    claimed, own, size
+    claimed, own, levels, measures
         As in `disagreement`.
     """
-    if own.vague(claimed, VAGUE, FAINT * size):
+    size = measures.size
+    if own.vague(claimed, VAGUE, FAINT * size) or _told_nothing(claimed, own, levels, size):
         return True
     value = getattr(claimed, "value", claimed.lower)
     known = own.finite and math.isfinite(value)
     return known and size > 0.0 and not own.widened(VAGUE, FAINT * size).contains(Bounds(value, value))
+
+
+def _told_nothing(claimed: Interval, own: Bounds, levels: Levels, size: float) -> bool:
+    """Return whether less is told of a number than whoever knows it well would tell."""
+    unknown = levels.given and (claimed.lower, claimed.upper) == (-math.inf, math.inf)
+    return not unknown and not own.covers(claimed, levels.slack, size)

@@ -128,7 +128,7 @@ class PolicyCheck:
             size = levels.measures[level].size
             apart, is_open = _apart(best, followed, where, self.told.question.tolerance, size)
             undecided |= is_open
-            if apart is not None and levels.attainable(level):
+            if apart is not None:
                 name = self.frame.mdp.names[apart]
                 reason = f"it is not optimal{_nth(level)}: another does better from state {apart}"
                 return Check(what="optimum", where=name, state=apart, verdict=Verdict.FAILS, reason=reason)

@@ -110,6 +110,15 @@ class Prices:
                 found |= self._spread(part, (values != 0).astype(np.float64)) > 0
         return found
 
+    @cached_property
+    def largest(self) -> float:
+        """The largest amount, without its sign, of which anything that is paid is made up."""
+        if self.terms is None:
+            return 1.0
+        with np.errstate(over="ignore"):
+            amounts = [abs(weight) * float(np.abs(values).max(initial=0.0)) for weight, _, values in self._parts()]
+        return min(max(amounts, default=0.0), float(np.finfo(np.float64).max))
+
     def exactly(self, choice: int) -> Fraction:
         """Return what one choice pays as a fraction, its probabilities divided by their sum."""
         if self.terms is None:

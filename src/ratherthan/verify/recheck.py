@@ -34,8 +34,9 @@ Compared with the model, each with a verdict:
 
 Left undecided: words that are not the model's own, unless the same lexicon is given; a product that is too large to be built
 again; what a further level rests on where it is not plain which choices are best at the level before: they differ by less than
-a ten-millionth and more than rounding, or more and more can be gathered with them. Large models in which a run can go round
-for rewards of both signs that cancel are undecided, too.
+a ten-millionth and more than rounding, or more and more can be gathered with them; or where no one plan is known to attain all
+levels (`attained`). Large models in which a run can go round for rewards of both signs that cancel are undecided, too. And a
+number that contains the truth, but is known less well than it could be: only one that says next to nothing is a forgery.
 Not compared: ``source``, which is only where the model came from, and fields that do not matter to the question, such as
 ``alpha`` where no critical state is spoken of. What the explanation leaves unsaid is no fault of it, but an alternative or a
 detail that it must name is.

@@ -10,6 +10,7 @@ import numpy as np
 from ratherthan.explain.explanation import Explanation
 from ratherthan.model.mdp import Bools
 from ratherthan.verify.frame import Frame
+from ratherthan.verify.measure import GROSS, ROUNDED
 from ratherthan.verify.paths import TIE, Moves
 from ratherthan.verify.values import Band
 from ratherthan.verify.verdict import Check, Verdict
@@ -243,12 +244,13 @@ class RouteCheck:
         if own.lower == -math.inf:
             flaw = "it is not known: the policy that is listed says nothing of a state it comes to"
             return self._check("arrival_probability", flaw)
-        if not (own.meets(claimed) and own.covers(claimed, self.slack)):
+        if not (own.meets(claimed) and own.covers(claimed, max(self.slack, GROSS), ROUNDED / GROSS)):
             truth = f"it lies between {own.lower:.10g} and {own.upper:.10g}"
             flaw = f"{truth}, got {claimed.lower:.10g} to {claimed.upper:.10g}"
             return self._check("arrival_probability", flaw)
         found = self._check("arrival_probability", None)
-        return replace(found, verdict=Verdict.UNDECIDED) if own.vague(claimed, VAGUE) else found
+        unsure = own.vague(claimed, VAGUE) or not own.covers(claimed, self.slack)
+        return replace(found, verdict=Verdict.UNDECIDED) if unsure else found
 
 
 def _hazards_in_the_way(frame: Frame, start: int, told: tuple[int, ...]) -> str | None:

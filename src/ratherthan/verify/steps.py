@@ -45,7 +45,7 @@ class StepCheck:
         for claim in self.step.claims:
             flaw, is_open = self._claim(claim)
             found.append(self._check(claim.claim, flaw, is_open))
-        found.append(self._check("claims", self._together(), is_open=False))
+        found.append(self._check("claims", self._together(), is_open=self._unsaid(1) is not None))
         return found
 
     def _check(self, what: str, flaw: str | None, is_open: bool) -> Check:
@@ -85,7 +85,7 @@ class StepCheck:
         measures = self.levels.measures[level]
         silent = any(map(measures.silent, choices))
         for name, claimed, own in zip(("largest", "smallest"), told, measures.spread(choices), strict=True):
-            flaw = disagreement(claimed, own, self.levels, measures.size, silent=silent)
+            flaw = disagreement(claimed, own, self.levels, measures, silent=silent)
             if flaw:
                 return f"the {name} number {flaw}"
         return None
@@ -127,14 +127,30 @@ class StepCheck:
     def _critical_is_open(self) -> bool:
         if "selectiveness" not in self.levels.asked.factors:
             return False
+        if self._spread_is_vague():
+            return True
         known = self.levels.is_critical(self.step.state) is not None
         if self.step.critical is None:  # it is said to be open: with one level that must follow from the numbers
             return known and len(self.levels.frames) > 1 and not math.isinf(self.levels.slack)
-        vague = any(
+        unsettled = any(
             spread is not None and not self._group(level)[1]
             for level, spread in enumerate(self.step.further_spreads, start=1)
         )
-        return vague or not known
+        return unsettled or not known
+
+    def _spread_is_vague(self) -> bool:
+        """Return whether the numbers that are given for the flag are known less well than they could be."""
+        levels, told = self.levels, [self.step.spread, *self.step.further_spreads]
+        return any(
+            not own.covers(claimed, levels.slack, levels.measures[level].size)
+            for level, spread in enumerate(told)
+            if spread is not None and (level == 0 or self._group(level)[1])
+            for claimed, own in zip(spread, self._own_spread(level), strict=True)
+            if not (levels.given and (claimed.lower, claimed.upper) == (-math.inf, math.inf))
+        )
+
+    def _own_spread(self, level: int) -> tuple[Bounds, Bounds]:
+        return self.levels.measures[level].spread(self._group(level)[0] if level else self._choices)
 
     # -- claims
 
@@ -202,10 +218,11 @@ class StepCheck:
             low = min(number.upper for number in first), min(number.lower for number in first)
             if [(x.upper, x.lower) for x in self.step.spread] != [high, low]:
                 return "the largest and the smallest number are not those of its evidence"
-        return self._missing([claim.claim for claim in self.step.claims if claim.level == 0])
+        return self._unsaid(2)
 
-    def _missing(self, names: list[str]) -> str | None:
-        """Return which claim that holds, and that was asked for, is not made."""
+    def _unsaid(self, how: int) -> str | None:
+        """Return which claim is not made that holds for everyone who knows well (1), or just well enough (2), what it rests on."""
+        names = [claim.claim for claim in self.step.claims if claim.level == 0]
         asked, levels = self.levels.asked, self.levels
         told = self.step.critical is not False or "selectiveness" not in asked.factors or asked.scope == "state"
         if not told or self.step.foil is not None or math.isinf(levels.slack):
@@ -213,7 +230,7 @@ class StepCheck:
         others, measures = self._others, levels.measures[0]
         exact = not asked.search.toward_goal  # else what is near the goal may be open to one and not to the other
         flexible = "constrictiveness" in asked.factors and bool(others) and exact
-        missing = self._flexibility_missing(names, others) if flexible else None
+        missing = self._flexibility_missing(names, others, how) if flexible else None
         if missing or "responsibility" not in asked.factors or "hopeless" in names:
             return missing
         if not others and "only way on" not in names:
@@ -223,14 +240,11 @@ class StepCheck:
             return "what it avoids is not said"
         return None
 
-    def _flexibility_missing(self, names: list[str], others: list[int]) -> str | None:
-        """Return which claim about counts holds for everyone who knows the numbers well, and is not made."""
-        own = self._admitted(self.step.choice)
-        rest = [self._admitted(choice) for choice in others]
+    def _flexibility_missing(self, names: list[str], others: list[int], how: int) -> str | None:
+        """Return which claim about counts holds for everyone who knows the numbers so well, and is not made."""
+        own = self.levels.counts.count(self.step.choice)[how]
+        rest = [self.levels.counts.count(choice)[how] for choice in others]
         for name in FLEXIBLE:
             if name not in names and all(COUNTED[name](own, other) for other in rest):
                 return f"that it is {name} is not said"
         return None
-
-    def _admitted(self, choice: int) -> Bounds:
-        return self.levels.counts.count(choice)[1]

@@ -92,12 +92,12 @@ class TradeCheck:
             return self._check("totals", None, f"there must be {wanted}, got {len(told.totals)}", is_open=False)
         open_ = False
         for view, total in zip(self.views, told.totals, strict=False):
-            own, size, silent = view.measures.band[told.start], view.measures.size, view.measures.band.silent
+            own, silent = view.measures.band[told.start], view.measures.band.silent
             unknown = silent is not None and bool(silent[told.start])
-            flaw = disagreement(total, own, self.levels, size, silent=unknown)
+            flaw = disagreement(total, own, self.levels, view.measures, silent=unknown)
             if flaw:
                 return self._check("totals", None, f"one {flaw}", is_open=False)
-            open_ |= vague(total, own, size)
+            open_ |= vague(total, own, self.levels, view.measures)
         return self._check("totals", None, None, is_open=open_)
 
     def checks(self, step: Step) -> list[Check]:
@@ -144,7 +144,7 @@ class TradeCheck:
             if flaw:
                 return f"the number of '{row.action}' {flaw}", False
             own = view.number(step.state, row.choice)[0]
-            open_ |= vague(row.number, own, view.measures.size)
+            open_ |= vague(row.number, own, self.levels, view.measures)
         told = self._relation(view, judged.taken.number, judged.other.number)
         if told != judged.relation:
             return f"it is {told} by its numbers, got {judged.relation}", False
@@ -156,7 +156,7 @@ class TradeCheck:
 
     def _row(self, state: int, view: View, row: Measured) -> str | None:
         own, silent = view.number(state, row.choice)
-        flaw = disagreement(row.number, own, self.levels, view.measures.size, silent=silent)
+        flaw = disagreement(row.number, own, self.levels, view.measures, silent=silent)
         fate, known = view.fate(state, row.choice)
         if flaw is None and known and row.fate != fate:
             return f"means '{fate}', got '{row.fate}'"

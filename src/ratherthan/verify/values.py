@@ -9,11 +9,15 @@ exact fractions (`exact`), many are bounded by sweeps (`sweeps`).
 Where arrival is demanded and rewards have any sign, the value is -∞ (minimised: ∞) outside X, and 0 where nothing can be paid
 any more; in the rest it may be ∞ (-∞), which no graph tells: `exact` and `growth` do. The expected total is the limit of the
 expected sums of the first k rewards. With a discount the value is 0 where nothing can be paid any more.
+
+Where only policies count that surely end, the least probability of the target is 0 where a run can surely end elsewhere, and to
+go round without an end is no way to keep off it: as for costs of nothing, what can be gone round in is one state. The largest
+cost is then a reward until a goal.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -67,7 +71,11 @@ def optimum(frame: Frame, budget: Budget) -> Band:
     if frame.demanding:
         return _gathered(frame, budget)
     if frame.costs:
+        if frame.maximise and frame.ending:
+            return _gathered(replace(frame, demanding=True), budget)
         return _greatest_cost(frame, budget) if frame.maximise else _least_cost(frame, budget)
+    if not frame.maximise and frame.ending:
+        return _least_chance_ending(frame, budget)
     return _greatest_chance(frame, budget) if frame.maximise else _least_chance(frame, budget)
 
 
@@ -141,6 +149,19 @@ def _least_chance(frame: Frame, budget: Budget) -> Band:
     rows = open_[frame.row_state] & frame.usable
     known = np.where(sure, 1.0, 0.0)
     return _bounded(Open(frame=frame, open=open_, rows=rows, known=known, block=_none(frame)), budget)
+
+
+def _least_chance_ending(frame: Frame, budget: Budget) -> Band:
+    """Bound the least probability of policies that do not put off the end for ever; nothing is known where there are none."""
+    ending = frame.sure(frame.target | frame.out, frame.running, frame.usable)
+    rows = frame.rows_within(ending) & frame.usable
+    safe = frame.sure(frame.out, frame.running, rows)
+    open_ = frame.reach(frame.out, frame.running, rows) & frame.running & ending & ~safe
+    rows &= open_[frame.row_state]
+    block, _ = frame.blocks(open_, rows)
+    known = np.where(safe, 0.0, 1.0)
+    band = _bounded(Open(frame=frame, open=open_, rows=rows, known=known, block=block), budget)
+    return Band(lower=np.where(ending, band.lower, 0.0), upper=band.upper)
 
 
 def _bounded(problem: Open, budget: Budget) -> Band:
