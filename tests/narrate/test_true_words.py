@@ -136,6 +136,22 @@ def test_a_run_that_has_ended_badly_is_not_said_to_stay() -> None:
     assert text.endswith("We never succeed: we end at state 3, failed.")
 
 
+def test_where_it_may_end_up_is_not_said_to_be_likely() -> None:
+    """The likeliest single way leads to state 1 with 0.4, but two others meet in state 4 with 0.6 together."""
+    table: Table = {
+        0: {"go": ([(0.4, 1), (0.3, 5), (0.3, 6)], 1), "right": ([(1.0, 2)], 2)},
+        1: {"stay": ([(1.0, 1)], 1)},
+        2: {"end": ([(1.0, 2)], 0)},
+        3: {"end": ([(1.0, 3)], 0)},
+        4: {"stay": ([(1.0, 4)], 1)},
+        5: {"on": ([(1.0, 4)], 1)},
+        6: {"on": ([(1.0, 4)], 1)},
+    }
+    problem = model(table)
+    lost = evaluate(problem, policy(problem, "go", "stay", "end", "end", "stay", "on", "on"))
+    assert "We never arrive: we may end up at state 1 for ever." in confirmed(lost, kind="contrastive")
+
+
 def test_a_run_that_stays_is_said_to_stay() -> None:
     problem = model()
     staying = evaluate(problem, policy(problem, "left", "stay", "end", "on"))
@@ -172,7 +188,7 @@ def test_a_deterministic_round_is_certain() -> None:
     table[1] = {"a": ([(0.6, 0), (0.4, 2)], 1)}
     problem = model(table, Discounted(reward="cost", discount=0.5))
     perhaps = narrate(explain(evaluate(problem, policy(problem, "a", "a", "end", "end")), "naive-path"))
-    assert perhaps.endswith("Most likely, this route then comes back to state 0.")
+    assert perhaps.endswith("This route may then come back to state 0.")
 
 
 def test_states_of_a_product_are_not_counted_as_places() -> None:
