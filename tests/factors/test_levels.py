@@ -17,7 +17,7 @@ from ratherthan.solve.levels import ended_at
 LEVELS: dict[str, tuple[Level, ...]] = {
     "safest, cheapest": (ReachAvoid(goal=GOAL, through=f"!{HAZARD}"), ExpectedCost(goal=GOAL, reward="cost")),
     "steps, reward": (ExpectedCost(goal=GOAL, reward=None), ExpectedReward(goal=GOAL, reward="cost")),
-    "likeliest, discounted": (ReachAvoid(goal=GOAL), Discounted(reward="cost", discount=0.5)),
+    "least risk, discounted": (ReachAvoid(goal=HAZARD, maximise=False), Discounted(reward="cost", discount=0.5)),
     "three": (
         ReachAvoid(goal=GOAL),
         ExpectedCost(goal=GOAL, reward=None),
