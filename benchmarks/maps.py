@@ -33,13 +33,13 @@ def by_storm(problem: Problem, method: str) -> Callable[[], object]:
             raise UnavailableError("stormpy is not installed")
 
         return missing
-    import os
     import tempfile
+    from pathlib import Path
 
     from ratherthan.io import write
 
     with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "map.drn")  # noqa: PTH118 - one place
+        path = str(Path(folder) / "map.drn")
         write(problem, path)
         model = stormpy.build_model_from_drn(path)
     wanted = stormpy.parse_properties('R{"steps"}min=? [F "goal"]')[0]

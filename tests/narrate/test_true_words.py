@@ -20,7 +20,7 @@ from ratherthan.model.product import lifted, unfolded
 from ratherthan.narrate import narrate
 from ratherthan.narrate.naming import goal_of
 from ratherthan.narrate.numbers import at_most
-from ratherthan.solve import Solution, evaluate, solve
+from ratherthan.solve import Outcome, Solution, evaluate, solve
 from ratherthan.verify import Verdict, verify
 
 COST = OBJECTIVES["least cost"]
@@ -280,3 +280,18 @@ def test_a_chance_and_its_opposite_are_not_told_as_different_and_equal() -> None
     text = confirmed(solve(problem), state=0, rather_than="b", also=['Pmax=? [F "goal"]'])
     assert "because it leads to a safer route (a difference below 0.01)" in text
     assert "equally" not in text
+
+
+@pytest.mark.parametrize(
+    ("outcome", "said"),
+    [
+        (Outcome.CERTIFIED, ""),
+        (Outcome.UNCERTIFIED, " The numbers behind this plan are not proved."),
+        (Outcome.STOPPED, " Not all numbers behind this plan are proved closely."),
+        (Outcome.LOWER_ONLY, " Not all numbers behind this plan are proved closely."),
+        (Outcome.UPPER_ONLY, " Not all numbers behind this plan are proved closely."),
+    ],
+)
+def test_numbers_with_bounds_are_not_said_to_be_unproved(outcome: Outcome, said: str) -> None:
+    explanation = explain(solve(model()), "contrastive")
+    assert narrate(replace(explanation, outcome=outcome.value)) == narrate(explanation) + said

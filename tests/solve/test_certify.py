@@ -31,7 +31,8 @@ from ratherthan.solve.certify import (
 from ratherthan.solve.linear import solve_chain
 from ratherthan.solve.policy_iteration import Found, PolicyIteration, iterate_policies
 from ratherthan.solve.system import System, rows_of
-from ratherthan.solve.task import goal_of, objective_of, task_of
+from ratherthan.solve.task import goal_of, task_of
+from ratherthan.solve.wanted import objective_of
 
 WALK: Table = {
     0: {"on": ([(0.9, 1), (0.1, 0)], 1), "leap": ([(0.5, 2), (0.5, 0)], 1)},

@@ -43,7 +43,7 @@ def main(context: click.Context) -> None:
     """Explain plans of Markov decision processes: why this action rather than that one.
 
     A SOURCE is a bundled example (example:paper-5x5), a road map (.roadmap), a PRISM or JANI model, a UMB archive
-    (.umb), a NumPy archive (.npz), or a Gymnasium environment (gym:FrozenLake-v1, with arguments after commas:
+    (.umb), a NumPy archive (.npz), Storm's explicit text (.drn), or a Gymnasium environment (gym:FrozenLake-v1, with arguments after commas:
     gym:FrozenLake-v1,map_name=8x8,is_slippery=false) or its table (.json.gz).
     """
     if context.invoked_subcommand is None:

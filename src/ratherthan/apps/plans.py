@@ -37,7 +37,7 @@ def tradeoffs_of(wanted: Wanted, given: Mapping[str, Any]) -> Tradeoffs:
         return tradeoffs(problem, wishes, bound=bound, most=given["most"], progress=tell)
 
 
-def _wishes(wanted: Wanted, problem: Problem, also: tuple[str, ...]) -> list[Objective]:
+def _wishes(wanted: Wanted, problem: Problem, also: tuple[str, ...]) -> list[Level]:
     """Return the objectives; where there is but one, also the least of each other reward until the same goal."""
     from ratherthan.errors import QuestionError
     from ratherthan.model.discounts import discount_taken
@@ -45,7 +45,7 @@ def _wishes(wanted: Wanted, problem: Problem, also: tuple[str, ...]) -> list[Obj
     from ratherthan.model.objective import ReachAvoid, levels_of
     from ratherthan.model.property import wish_of
 
-    wishes: list[Objective] = []
+    wishes: list[Level] = []
     for text in wanted.properties or (None,):
         wishes += levels_of(_best(wish_of(problem, text, discount=wanted.discount)))
     for text in also:
@@ -78,7 +78,7 @@ def _excluded(other: Level, own: Objective, problem: Problem) -> bool:
     return name == getattr(own, "reward", None) or any((values < 0).any() for _, values in parts)
 
 
-def _bound(wishes: list[Objective], at_most: str | None, at_least: str | None) -> dict[str, float] | None:
+def _bound(wishes: list[Level], at_most: str | None, at_least: str | None) -> dict[str, float] | None:
     """Return the bound that was given by NAME=NUMBER."""
     from ratherthan.errors import QuestionError
     from ratherthan.solve.weighing import called
@@ -96,11 +96,10 @@ def _bound(wishes: list[Objective], at_most: str | None, at_least: str | None) -
     if not math.isfinite(value):
         raise QuestionError(f"{option} must be given as NAME=NUMBER, such as risk=0.2, got '{text}'.")
     for wish in wishes:
-        gathered = getattr(wish, "maximise", False)
-        if called(wish) == name.strip() and gathered != (option == "--at-least"):  # type: ignore[arg-type]
-            other = "--at-least" if gathered else "--at-most"
+        if called(wish) == name.strip() and wish.maximise != (option == "--at-least"):
+            other = "--at-least" if wish.maximise else "--at-most"
             raise QuestionError(
-                f"'{wish.text}' asks for {'the most' if gathered else 'the least'}: bound it with {other}, not {option}."
+                f"'{wish.text}' asks for {'the most' if wish.maximise else 'the least'}: bound it with {other}, not {option}."
             )
     return {name.strip(): value}
 

@@ -7,7 +7,7 @@ tells which states reach r without s. So if a successor of (s,a) reaches r witho
 the search tree, its weight is a difference of sums known beforehand, and only what lies outside of it is searched. It is
 exact for any landmarks; their choice matters for speed alone. Good ones lie on the route and in the largest strong component.
 
-Two trees per landmark cost about as much as ten searches: below some dozens of choices the plain search is faster.
+The two trees of a landmark cost about as much as five searches: below some dozens of choices the plain search is faster.
 
 References
 ----------
@@ -33,8 +33,8 @@ __all__ = ["Landmarks", "landmarks", "landmarks_of", "tree_weights"]
 Numbers = npt.NDArray[np.int64]
 
 LANDMARKS = 3
-BUDGET = 20_000_000
-"""How many visits of a state are made between two chances to be interrupted: about half a second."""
+BUDGET = 4_000_000
+"""How many visits of a state are made between two chances to be interrupted: less than a second."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

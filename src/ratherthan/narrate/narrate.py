@@ -60,9 +60,11 @@ def _state_text(words: Vocabulary) -> str:
 
 
 def _unproved(words: Vocabulary) -> list[str]:
-    """Return the warning that belongs to values without a proof."""
-    proved = words.explanation.outcome in ("", Outcome.CERTIFIED.value)
-    return [] if proved else [words.table("route")["unproved"]]
+    """Return the warning that belongs to values without a proof, or with one that is not close enough."""
+    outcome = words.explanation.outcome
+    if outcome in ("", Outcome.CERTIFIED.value):
+        return []
+    return [words.table("route")["unproved" if outcome == Outcome.UNCERTIFIED.value else "partly_proved"]]
 
 
 def _end(words: Vocabulary) -> str:

@@ -206,7 +206,6 @@ class Ordered(NamedTuple):
     target: npt.NDArray[np.int32]
     probability: Floats
     cost: Floats  # [m]
-    source: npt.NDArray[np.int32]  # [m], the row of the system
 
 
 def ordered_rows(
@@ -223,7 +222,6 @@ def ordered_rows(
     after = np.zeros(len(target), np.int32)
     chance = np.zeros(len(target), np.float64)
     paid = np.zeros(m, np.float64)
-    source = np.zeros(m, np.int32)
     row, branch = 0, 0
     for i in range(n):
         node = order[i]
@@ -238,11 +236,10 @@ def ordered_rows(
                     chance[branch] = probability[b] / leave
                     branch += 1
             paid[row] = cost[a] / leave
-            source[row] = a
             row += 1
             branches_of_row[row] = branch
         rows_of_node[i + 1] = row
-    return Ordered(rows_of_node, branches_of_row, after[:branch], chance[:branch], paid, source)
+    return Ordered(rows_of_node, branches_of_row, after[:branch], chance[:branch], paid)
 
 
 def window_pass(
@@ -305,8 +302,8 @@ def window_pass(
     return spent
 
 
-def window_residual(rows: Ordered, values: Floats, taken: npt.NDArray[np.int32]) -> float:
-    """Return max |Tv - v|; the best row for the values as they are leaves in `taken`."""
+def window_residual(rows: Ordered, values: Floats) -> float:
+    """Return max |Tv - v|."""
     largest = 0.0
     for s in range(len(rows.node_to_rows) - 1):
         best = np.inf
@@ -314,9 +311,7 @@ def window_residual(rows: Ordered, values: Floats, taken: npt.NDArray[np.int32])
             x = rows.cost[a]
             for b in range(rows.row_to_branches[a], rows.row_to_branches[a + 1]):
                 x += rows.probability[b] * values[rows.target[b]]
-            if x < best:
-                best = x
-                taken[s] = a
+            best = min(best, x)
         largest = max(largest, abs(best - values[s]))
     return largest
 

@@ -20,10 +20,11 @@ from ratherthan.model.objective import Level, Mission, Objective, levels_of
 from ratherthan.model.policy import Policy, check_policy
 from ratherthan.model.problem import Problem
 from ratherthan.solve.chain import Chain, Evaluated, chain_of, evaluated, refuse_unsaid
-from ratherthan.solve.goal import Goal, goal_of, objective_of, reaching
+from ratherthan.solve.goal import Goal, goal_of, reaching
 from ratherthan.solve.lexicographic import ordered, over_after
 from ratherthan.solve.optimum import Method, Optimum
 from ratherthan.solve.solution import Outcome, Solution
+from ratherthan.solve.wanted import objective_of
 
 __all__ = ["arrival", "evaluate", "solve", "unfolded_for"]
 

@@ -37,9 +37,9 @@ import numpy as np
 from ratherthan.model import graph
 from ratherthan.model.mdp import Bools
 from ratherthan.solve.gathering import discounted, most_reward
-from ratherthan.solve.goal import Goal, Kind, Task, goal_of, objective_of
+from ratherthan.solve.goal import Goal, Kind, Task, goal_of
 
-__all__ = ["Goal", "Task", "goal_of", "objective_of", "task_of"]
+__all__ = ["Goal", "Task", "goal_of", "task_of"]
 
 
 def task_of(goal: Goal, must_end: Bools | None = None) -> Task:

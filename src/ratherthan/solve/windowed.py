@@ -6,7 +6,7 @@ bound of every policy that arrives; and (1 + h) v passes ``never_rises`` along t
 there. That policy then arrives with probability 1: (1 + h) v falls by at least the least cost at every step, and is never below 0.
 So both bounds are proved by one pass each over the rows, whatever the sweeps did, and the policy's value lies between the same two.
 
-Which h is tried follows from the largest D(a) / c(a). With a residual of 1e-9 of the least cost it is about 1e-9.
+Which h is tried follows from the largest D(a) / c(a). With a residual below 1e-8 of the least cost it is at most some 5e-8.
 
 Rows are tied up to a gap of a few residuals, and the first listed of a state's tied choices is taken: what that loses is part of h.
 """
@@ -38,7 +38,7 @@ FEWEST = 3000
 """From how many nodes on windows are tried before equations: below, these are solved at once, and to the last digit."""
 WIDEST = 1e-7
 """Up to which h the bounds are of use."""
-TIE = 10.0
+TIE = 4.0
 """Up to how many residuals a row may fall behind the best and be tied."""
 ROOM = 1.0 + 1e-6
 TRIES = 3
@@ -49,6 +49,8 @@ def suits_windows(task: Task, core: System, whole: System) -> bool:
     """Return whether windowed sweeps are worth a try: many states, a cost to be kept small, and all costs positive."""
     goal = task.goal
     if goal.kind is not Kind.COST or goal.maximise or goal.signed or core is not whole or core.nodes < FEWEST:
+        return False
+    if len(core.target) > np.iinfo(np.int32).max:  # the sweeps count in 32 bits
         return False
     return is_compiled(len(core.target)) and bool(core.cost.min() > 0.0) and bool(np.isfinite(core.cost).all())
 

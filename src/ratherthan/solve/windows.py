@@ -3,7 +3,7 @@
 On a map the values of far places rest on those of near ones. Let the nodes lie in layers, by their distance from the sinks in
 steps, and solve a *window* of some dozens of layers until it is quiet; then move on by half a window. Values beyond
 the window are looked at, but hardly matter yet; and slow pockets are quiet before anything that rests on them is touched.
-Every node is swept some fifty times, while it lies in the cache, whereas sweeps over the whole map would have to be as many as
+Every node is swept some sixty times, while it lies in the cache, whereas sweeps over the whole map would have to be as many as
 it has layers. A sweep in place takes the best row of every node (Gauss-Seidel); some more keep to what was taken, and cost a
 row each (modified policy iteration, Puterman and Shin 1978). Loops of a row to its own node are taken out beforehand.
 
@@ -26,7 +26,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from ratherthan.model import graph
 from ratherthan.model._kernels import compiled
@@ -36,7 +35,6 @@ from ratherthan.solve.system import System
 
 __all__ = ["Windowed", "Windows", "sweep_windows"]
 
-Nodes = npt.NDArray[np.int64]
 Progress = Callable[[str], None]
 
 MOST_PASSES = 12
@@ -64,10 +62,9 @@ class Windows:
 
 
 class Windowed(NamedTuple):
-    """Where the sweeps came to: values, the rows that are best for them, visits per node, and whether they converged."""
+    """Where the sweeps came to: values, visits per node, and whether they converged."""
 
     values: Floats  # [n]
-    rows: Nodes  # [n]
     visits: float
     converged: bool
 
@@ -103,7 +100,7 @@ def sweep_windows(system: System, settings: Windows, progress: Progress | None =
         left -= kernel(rows, layers, values, taken, width, tolerance, step, left)
         if left < 0:
             break
-        before, residual = residual, float(compiled(window_residual, len(system.target))(rows, values, taken))
+        before, residual = residual, float(compiled(window_residual, len(system.target))(rows, values))
         if progress is not None:
             progress(f"windowed sweeps, pass {number}: residual {residual:.1e}")
         if residual <= wanted or not np.isfinite(residual):
@@ -113,6 +110,4 @@ def sweep_windows(system: System, settings: Windows, progress: Progress | None =
         step, tolerance = 0.0, max(0.3 * wanted, 0.01 * tolerance)
     found = np.empty(n)
     found[order] = values[:n]
-    best = np.empty(n, dtype=np.int64)
-    best[order] = rows.source[taken]
-    return Windowed(found, best, settings.most - left / n, bool(residual <= wanted))
+    return Windowed(found, settings.most - left / n, bool(residual <= wanted))
