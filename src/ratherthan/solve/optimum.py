@@ -116,12 +116,11 @@ def _at_once(
     layered: tuple[Layered | None, int],
     progress: Progress | None,
 ) -> Optimum | None:
-    """Return the optimum by windowed sweeps or by one backward pass, None where neither suits."""
+    """Return the optimum by one backward pass or by windowed sweeps, None where neither suits."""
     (core, whole), (plain, finest) = systems, layered
-    quick = _windowed(task, core, whole, progress) if finest == 0 else None
-    if quick is None and plain is not None and plain.narrow:
+    if plain is not None and plain.narrow:
         return _layered(task, core, node, plain, finest)
-    return quick
+    return _windowed(task, core, whole, progress) if finest == 0 else None
 
 
 def _layered_bounds(task: Task, core: System) -> Layered | None:
