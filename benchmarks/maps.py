@@ -1,63 +1,25 @@
-"""How fast a slippery map is solved with proved bounds, against equations and against Storm's sound methods."""
+"""How fast maps of 90,000 cells are solved with proved bounds, against equations and against Storm's sound methods."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 
-from benchmarks.harness import Case, UnavailableError
-from benchmarks.models import slippery_map
-from ratherthan.model.problem import Problem
-from ratherthan.solve import Outcome, PolicyIteration, solve
+from benchmarks.harness import Case
+from benchmarks.models import slippery_map, still_map
+from benchmarks.peers import SOUND, by_storm, by_us
+from ratherthan.solve import PolicyIteration
 
 SIDE = 300
 
 
-def solved(problem: Problem, method: PolicyIteration | None = None) -> Callable[[], object]:
-    """Return a function that solves a problem and looks whether the bounds are proved."""
-
-    def run() -> None:
-        solution = solve(problem, method=method)
-        if solution.outcome is not Outcome.CERTIFIED:
-            raise UnavailableError(solution.outcome.value)
-
-    return run
-
-
-def by_storm(problem: Problem, method: str) -> Callable[[], object]:
-    """Return a function that lets Storm check the model, which is handed over once, beforehand."""
-    try:
-        import stormpy
-    except ImportError:
-
-        def missing() -> None:
-            raise UnavailableError("stormpy is not installed")
-
-        return missing
-    import tempfile
-    from pathlib import Path
-
-    from ratherthan.io import write
-
-    with tempfile.TemporaryDirectory() as folder:
-        path = str(Path(folder) / "map.drn")
-        write(problem, path)
-        model = stormpy.build_model_from_drn(path)
-    wanted = stormpy.parse_properties('R{"steps"}min=? [F "goal"]')[0]
-    environment = stormpy.environments.sound()
-    environment.solver().min_max().method = getattr(stormpy.environments.MinMaxMethod, method)
-    return lambda: stormpy.model_checking(model, wanted, environment=environment)
-
-
-def cases() -> list[Case]:
-    problem = slippery_map(SIDE)
-    size = f"{SIDE} × {SIDE} cells"
+def cases(side: int = SIDE) -> list[Case]:
+    slips, stays = partial(slippery_map, side), partial(still_map, side)
+    sideways, failing = f"{side} × {side} cells, moves slip", f"{side} × {side} cells, moves may fail"
+    equations = Case(name="ratherthan, policy iteration", run=by_us(slips, PolicyIteration()), group=sideways)
     return [
-        Case(
-            name=f"Storm, optimistic value iteration, {size}",
-            run=by_storm(problem, "OPTIMISTIC_VALUE_ITERATION"),
-            peer=True,
-        ),
-        Case(name=f"Storm, sound value iteration, {size}", run=by_storm(problem, "SOUND_VALUE_ITERATION"), peer=True),
-        Case(name=f"ratherthan, policy iteration, {size}", run=solved(problem, PolicyIteration())),
-        Case(name=f"ratherthan, {size}", run=solved(problem)),
+        Case(name="ratherthan", run=by_us(slips), group=sideways, peer=True),
+        *([equations] if side < 500 else []),
+        *(Case(name=f"Storm, {name}", run=by_storm(slips, method), group=sideways) for name, method in SOUND.items()),
+        Case(name="ratherthan", run=by_us(stays), group=failing, peer=True),
+        *(Case(name=f"Storm, {name}", run=by_storm(stays, method), group=failing) for name, method in SOUND.items()),
     ]
