@@ -11,7 +11,7 @@ PACKAGE := $(shell find src pyproject.toml README.md -type f -not -name '*.py[co
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup run test check format docs golden bench lock clean distclean
+.PHONY: help setup run test check format docs golden kernels bench lock clean distclean
 
 help:  ## List the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -65,11 +65,15 @@ format: $(VENV)/.ready  ## Format the code and mend what the linter can mend
 docs: $(VENV)/.ready  ## Write the generated pages anew: docs/cli.md and docs/schema/
 	$(BIN)/python tools/docs_in_step.py --write
 
+kernels: $(VENV)/.ready  ## Turn the kernels into the text that travels with the package, anew
+	RATHERTHAN_COMPILE=auto $(BIN)/python tools/ship_kernels.py
+
 golden: $(VENV)/.ready  ## Write the golden files anew; review the difference before you keep it
 	$(BIN)/pytest -n $(JOBS) -m golden --update-golden
 
-bench: $(VENV)/.ready  ## Print ratios against peers measured in the same run
-	$(BIN)/python -m benchmarks
+bench: $(VENV)/.ready  ## Print ratios against peers measured in the same run; NAMES="maps traps" for some
+	@$(BIN)/python $(PIP) install -e '.[bench]' || echo "The peers cannot be installed here: they are left out."
+	$(BIN)/python -m benchmarks $(NAMES)
 
 lock: $(VENV)/.ready  ## Move all pins to the newest versions that pyproject.toml allows
 	$(PYTHON) tools/lock.py

@@ -8,7 +8,18 @@ import platform
 from benchmarks.harness import measure, table
 
 # A new benchmark is a module beside this one, with a function `cases`, and a word here.
-BENCHMARKS = ("startup", "maps", "large_maps", "generic", "traps", "discounted", "flexibility", "growth")
+BENCHMARKS = (
+    "startup",
+    "maps",
+    "large_maps",
+    "generic",
+    "traps",
+    "discounted",
+    "flexibility",
+    "questions",
+    "cluster",
+    "growth",
+)
 
 
 def main() -> None:

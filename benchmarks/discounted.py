@@ -8,8 +8,8 @@ from benchmarks.harness import Case
 from benchmarks.models import gambles
 from benchmarks.peers import by_mdpsolver, by_quantecon, by_us
 
-SIZES = ((20_000, 0.99), (100_000, 0.99), (100_000, 0.999))
-FEW = 20_000
+SIZES = ((5_000, 0.99), (100_000, 0.99), (100_000, 0.999))
+FEW = 5_000
 """Up to how many states a peer that takes lists is asked."""
 
 

@@ -275,13 +275,13 @@ def _problem(
 
 def _first_with_a_way(beside: Ints, goal: int) -> int:
     """Return the first cell from which the goal can be reached."""
-    reached = np.zeros(len(beside), dtype=np.bool_)
-    reached[goal] = True
-    while True:
-        more = reached | reached[beside].any(axis=1)
-        if (more == reached).all():
-            return int(np.argmax(reached))
-        reached = more
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import breadth_first_order
+
+    cells, ways = beside.shape
+    here = np.repeat(np.arange(cells), ways)
+    backwards = csr_array((np.ones(cells * ways), (beside.reshape(-1), here)), shape=(cells, cells))
+    return int(breadth_first_order(backwards, goal, return_predecessors=False).min())
 
 
 def _without_zeros(mdp: MDP) -> MDP:

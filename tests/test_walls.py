@@ -19,7 +19,10 @@ HOMES = {
     "stormpy": (lambda path: path == "io/_storm.py", "io/_storm.py"),
     "gymnasium": (lambda path: path == "io/gymnasium.py", "io/gymnasium.py"),
     "numba": (lambda path: path.rpartition("/")[2] == "_kernels.py", "files named _kernels.py"),
+    "llvmlite": (lambda path: path == "model/compiling/_kernels.py", "model/compiling/_kernels.py"),
     "lark": (lambda path: path.startswith("model/"), "model"),
+    "distributed": (lambda path: path == "cluster/engine.py", "cluster/engine.py"),
+    "dask": (lambda path: path == "cluster/engine.py", "cluster/engine.py"),
     "click": (lambda path: path.startswith("apps/"), "apps"),
     "rich": (lambda path: path.startswith("apps/"), "apps"),
 }
@@ -68,6 +71,7 @@ def test_a_library_is_imported_only_in_its_room(path):
         ("io/prism.py", "def f():\n    from lark import Lark"),
         ("io/_gym_explore.py", "from gymnasium import spaces"),
         ("render/svg.py", "from rich.text import Text"),
+        ("cluster/batch.py", "def f():\n    from distributed import Client"),
         ("explain/route.py", "from ratherthan.apps import cli"),
         ("explain/route.py", "from ratherthan import apps"),
     ],

@@ -14,7 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PINS = ROOT / "requirements" / "constraints.txt"
-EXTRAS = "dev,parquet,storm"
+EXTRAS = "dev,parquet,storm,bench"
 
 
 def main() -> None:

@@ -14,11 +14,12 @@ from __future__ import annotations
 import importlib
 import sys
 import types
-from typing import TYPE_CHECKING
 
+TYPE_CHECKING = False  # type checkers take it for true; loading the module typing takes longer than all of this
 if TYPE_CHECKING:
     from ratherthan.errors import ExplanationError as ExplanationError
     from ratherthan.errors import InputError as InputError
+    from ratherthan.errors import LimitError as LimitError
     from ratherthan.errors import MissingExtraError as MissingExtraError
     from ratherthan.errors import ModelError as ModelError
     from ratherthan.errors import NotExplainableError as NotExplainableError
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from ratherthan.errors import QuestionError as QuestionError
     from ratherthan.errors import RatherthanError as RatherthanError
     from ratherthan.errors import SourceError as SourceError
+    from ratherthan.errors import StoppedError as StoppedError
     from ratherthan.errors import UnsolvedError as UnsolvedError
     from ratherthan.explain import Explanation as Explanation
     from ratherthan.explain import Factors as Factors
@@ -49,10 +51,14 @@ if TYPE_CHECKING:
     from ratherthan.model.policy import Policy as Policy
     from ratherthan.model.problem import Problem as Problem
     from ratherthan.model.property import parse_property as parse_property
+    from ratherthan.model.watch import Limits as Limits
+    from ratherthan.model.watch import watching as watching
     from ratherthan.model.world import World as World
     from ratherthan.narrate import from_json as from_json
     from ratherthan.narrate import narrate as narrate
     from ratherthan.narrate import to_json as to_json
+    from ratherthan.render import Picture as Picture
+    from ratherthan.render import draw as draw
     from ratherthan.solve import Outcome as Outcome
     from ratherthan.solve import Solution as Solution
     from ratherthan.solve import evaluate as evaluate
@@ -74,12 +80,15 @@ __all__ = [  # noqa: RUF022 - sorted as `sorted` does, which a test holds
     "InputError",
     "Lexicographic",
     "Lexicon",
+    "LimitError",
+    "Limits",
     "MDP",
     "MissingExtraError",
     "Mission",
     "ModelError",
     "NotExplainableError",
     "Outcome",
+    "Picture",
     "Policy",
     "PolicyError",
     "Problem",
@@ -92,11 +101,13 @@ __all__ = [  # noqa: RUF022 - sorted as `sorted` does, which a test holds
     "Solution",
     "SourceError",
     "StateNames",
+    "StoppedError",
     "Threshold",
     "Tradeoffs",
     "UnsolvedError",
     "Verdicts",
     "World",
+    "draw",
     "evaluate",
     "explain",
     "from_json",
@@ -108,6 +119,7 @@ __all__ = [  # noqa: RUF022 - sorted as `sorted` does, which a test holds
     "to_json",
     "tradeoffs",
     "verify",
+    "watching",
     "write",
 ]
 
@@ -131,8 +143,10 @@ _ROOMS = {
     "model.policy": ["Policy"],
     "model.problem": ["Problem"],
     "model.property": ["parse_property"],
+    "model.watch": ["Limits", "watching"],
     "model.world": ["World"],
     "narrate": ["from_json", "narrate", "to_json"],
+    "render": ["Picture", "draw"],
     "solve": ["Outcome", "Solution", "evaluate", "solve"],
     "solve.pareto": ["Tradeoffs", "tradeoffs"],
     "verify": ["Verdicts", "verify"],

@@ -12,7 +12,9 @@
     │   ├── QuestionError           an unknown state, action, kind or setting
     │   ├── ExplanationError        a stored explanation is broken or was tampered with
     │   └── MissingExtraError       an optional dependency is not installed
-    └── UnsolvedError               a solver stopped before it converged
+    ├── UnsolvedError               a solver stopped before it converged
+    │   └── StoppedError            … because a limit was reached; it is a LimitError, too
+    └── LimitError                  a limit of time or memory was reached
 
 Every message says what must hold, what came, where, and what to do. The place is also carried as attributes.
 """
@@ -90,3 +92,11 @@ class MissingExtraError(InputError):
 
 class UnsolvedError(RatherthanError):
     """A solver stopped before it converged; `solution` holds what it has."""
+
+
+class LimitError(RatherthanError):
+    """A limit of time or memory was reached; `limit` is "time" or "memory", `phase` what was being done."""
+
+
+class StoppedError(UnsolvedError, LimitError):
+    """A limit of time or memory stopped a solver; `solution` holds the bounds that it had proved by then."""

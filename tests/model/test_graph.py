@@ -155,6 +155,82 @@ def test_end_components_are_the_maximal_ones(seed: int) -> None:
     assert found == {(group, frozenset(choices)) for group, choices in end_components(rows, through)}
 
 
+@pytest.mark.parametrize("seed", range(100))
+def test_what_is_found_on_the_way_to_sure_states_is_right(seed: int) -> None:
+    mdp, index, after, goal, through = drawn(seed)
+    allowed = np.array([Random(seed + c).random() < 0.8 for c in range(mdp.choices)])
+    fewer = [[row for c, row in zip(mdp.choices_of(s), after[s], strict=True) if allowed[c]] for s in range(mdp.states)]
+    g, i = mask(goal, mdp.states), mask(through, mdp.states)
+    found = graph.surely_reaching(index, g, i, allowed)
+    sure = surely_reach(fewer, goal, through)
+    assert members(found.states) == sure
+    assert members(found.possible) == can_reach(fewer, goal, through)
+    staying = {
+        c for s in sure - goal for c, row in zip(mdp.choices_of(s), after[s], strict=True) if allowed[c] and row <= sure
+    }
+    assert members(found.usable) == staying
+    assert {int(s) for s in found.order} == sure
+    level = graph.levels_to(index, g, i & found.states, found.usable)
+    assert (found.level[found.states] == level[found.states]).all()
+    assert (np.diff(found.level[found.order]) >= 0).all()
+    assert (found.level[~found.states] < 0).all()
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_the_way_back_is_the_first_choice_to_a_lower_level(seed: int) -> None:
+    mdp, index, _, goal, through = drawn(seed)
+    g, i = mask(goal, mdp.states), mask(through, mdp.states)
+    level = graph.levels_to(index, g, i)
+    down = graph.first_downhill(index, level, np.ones(mdp.choices, dtype=bool))
+    found = graph.way_back(index, g, i)
+    assert (found == np.where(i & ~g, down, -1)).all()
+
+
+def test_many_small_components_that_fall_apart_one_after_the_other_are_looked_at_once_each() -> None:
+    """Pairs of states of which each has a choice into the pair before; the first pair falls, and no other can stay by that choice."""
+    pairs = 3000
+    begin, rows, targets = [0], [0], []
+    for k in range(pairs):
+        one, other = 2 * k, 2 * k + 1
+        for own in ([[other], [max(one - 2, 0), other]], [[one]] if k else [[one, 2 * pairs]]):
+            for row in own:
+                targets += row
+                rows.append(len(targets))
+            begin.append(len(rows) - 1)
+    targets.append(2 * pairs)
+    rows.append(len(targets))
+    begin.append(len(rows) - 1)
+    index = build_index(np.array(begin), np.array(rows), np.array(targets))
+    inside = np.arange(index.states) < 2 * pairs
+    component, internal = graph.end_components(index, inside, np.ones(index.choices, dtype=bool))
+    assert (component[:2] == -1).all()
+    assert len(set(component[2:-1].tolist())) == pairs - 1
+    assert internal.sum() == 2 * (pairs - 1)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_end_components_of_larger_models_are_closed_connected_and_maximal(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    states = 60
+    choices, branches = rng.integers(1, 4, states), rng.integers(1, 4, 300)
+    begin = np.concatenate([[0], np.cumsum(choices)])
+    rows = np.concatenate([[0], np.cumsum(branches[: begin[-1]])])
+    near = np.repeat(np.repeat(np.arange(states), choices), branches[: begin[-1]])
+    target = (near + rng.integers(-2, 3, len(near))) % states  # neighbours: components of many sizes
+    index = build_index(begin, rows, target)
+    allowed, inside = rng.random(index.choices) < 0.7, rng.random(states) < 0.9
+    component, internal = graph.end_components(index, inside, allowed)
+    pairs = [
+        [(c, {int(t) for t in target[rows[c] : rows[c + 1]]}) for c in range(begin[s], begin[s + 1]) if allowed[c]]
+        for s in range(states)
+    ]
+    found = {
+        (frozenset(members(component == k)), frozenset(members(internal & (component[index.choice_to_state] == k))))
+        for k in set(component.tolist()) - {-1}
+    }
+    assert found == {(own, frozenset(rows_)) for own, rows_ in end_components(pairs, members(inside))}
+
+
 def test_a_long_chain_is_no_deep_recursion() -> None:
     states = 5000
     target = np.append(np.arange(1, states), 0)
@@ -175,6 +251,9 @@ def test_entering_choices_are_listed_by_state() -> None:
             c for c in range(mdp.choices) if s in set(mdp.branch_to_target[mdp.branches_of(c)].tolist())
         }
     assert index_of(mdp) is index, "built once"
+    before = index.entering.copy()
+    index.forget()
+    assert (index.entering == before).all(), "and made again where it was forgotten"
 
 
 def test_branches_of_chosen_rows_keep_their_order() -> None:

@@ -146,7 +146,7 @@ def test_whatever_a_solver_says_the_bounds_hold(seed: int, objective: str, monke
     problem = random_problem(random, most_states=6, objective=OBJECTIVES[objective])
     best = optimum_by_enumeration(problem)
 
-    def liar(system: System, maximise: bool, settings: PolicyIteration, progress: None) -> Found | None:
+    def liar(system: System, maximise: bool, settings: PolicyIteration, progress: None, **_: Any) -> Found | None:
         found = iterate_policies(system, maximise, settings, progress)
         assert found is not None
         wrong = np.array([random.choice([0.0, 1.0, 1.0, 1 + 1e-9, 0.9, 2.0]) for _ in range(system.nodes)])

@@ -325,7 +325,7 @@ def test_whatever_a_solver_says_the_bounds_hold(
     every = [range(len(problem.mdp.choices_of(s))) for s in range(problem.mdp.states)]
     best = level_values(problem, level, every, set())
 
-    def liar(system: System, maximise: bool, settings: PolicyIteration, progress: None) -> Found | None:
+    def liar(system: System, maximise: bool, settings: PolicyIteration, progress: None, **_: Any) -> Found | None:
         found = iterate_policies(system, maximise, settings, progress)
         if found is None or found.endless is not None:
             return found

@@ -42,7 +42,7 @@ def test_without_any_equation_solver_the_bounds_hold(
     random = Random(seed)
     problem = random_problem(random, most_states=5, objective=OBJECTIVES[objective])
     solution = solve(problem)
-    assert solution.engine in ("value iteration", "graph search", "one backward pass")
+    assert solution.engine.split(",")[0] in ("value iteration", "graph search", "one backward pass")
     for value, lower, upper in zip(
         optimum_by_enumeration(problem), *solution.lower.tolist(), *solution.upper.tolist(), strict=True
     ):

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from random_models import problem_of
 
 from ratherthan.model.index import build_index
+from ratherthan.model.objective import Discounted
+from ratherthan.solve import solve
 from ratherthan.solve.system import System, build_system, drift, exchanged, rows_of, two_sum
 
 SIZES = st.sampled_from([0.0, 1e-300, 1e-17, 1e-9, 0.1, 1 / 3, 1.0, 1.0 + 2**-52, 7.0, 1e9, 1e17])
@@ -66,6 +69,38 @@ def test_a_product_that_vanishes_is_still_counted_as_error() -> None:
     total, error = drift(system, np.array([1e-200]))
     assert total[0] == 0
     assert error[0] > 0
+
+
+@pytest.mark.parametrize("chance", [5e-324, 1.5e-323, 1e-310, 2.3e-308])
+@pytest.mark.parametrize("discount", [0.1, 0.5, 0.95, 0.999])
+@pytest.mark.parametrize("far", [1.0, 1e150, -1e300])
+def test_the_exact_drift_lies_within_its_error_where_a_discount_is_lost(
+    chance: float, discount: float, far: float
+) -> None:
+    index = build_index(np.array([0, 1, 2]), np.array([0, 2, 3]), np.array([0, 1, 1]))
+    probability = np.array([1.0, chance, 1.0])
+    system = build_system(index, probability, np.zeros(2), np.arange(2), np.arange(2), signed=True, discount=discount)
+    near = discount * chance * far
+    total, error = drift(system, np.array([near, far]))
+    chances = Fraction(discount) / (1 + Fraction(chance))
+    exact = chances * (Fraction(near) + Fraction(chance) * Fraction(far)) - Fraction(near)
+    assert abs(Fraction(float(total[0])) - exact) <= Fraction(float(error[0]))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("round_", [False, True])
+def test_discounted_bounds_hold_where_a_discount_is_lost(seed: int, round_: bool) -> None:
+    chance, discount = [5e-324, 1e-323, 1.5e-323, 3e-323][seed], 0.95
+    level = Discounted(reward="cost", discount=discount, maximise=False)
+    start = ([(1.0, 0 if round_ else 2), (chance, 1)], 0.0)
+    rows = {0: {"go": start}, 1: {"go": ([(1.0, 2)], 1e150)}, 2: {"stay": ([(1.0, 2)], 0.0)}}
+    solution = solve(problem_of(rows, level, goals=[2]))
+    own = Fraction(discount) * Fraction(chance) / (1 + Fraction(chance)) * Fraction(1e150)
+    if round_:
+        own /= 1 - Fraction(discount) / (1 + Fraction(chance))
+    lower, upper = float(solution.lower[0, 0]), float(solution.upper[0, 0])
+    assert lower == -np.inf or Fraction(lower) <= own
+    assert upper == np.inf or own <= Fraction(upper)
 
 
 def test_staying_in_place_costs_no_digits() -> None:

@@ -344,7 +344,7 @@ def test_hazards_in_the_way_are_those_on_a_shortest_way() -> None:
 def test_nothing_of_solvers_factors_and_claims_is_imported() -> None:
     folder = Path(ratherthan.__file__).parent / "verify"
     allowed = {"ratherthan.explain.explanation", "ratherthan.explain.question", "ratherthan.explain.record"}
-    for path in folder.glob("*.py"):
+    for path in folder.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -357,6 +357,38 @@ def test_nothing_of_solvers_factors_and_claims_is_imported() -> None:
 def test_the_outcomes_are_the_solvers() -> None:
     assert {outcome.value for outcome in Outcome} == set(OUTCOMES)
     assert OUTCOMES[0] == Outcome.CERTIFIED.value
+
+
+def test_where_only_a_limited_number_of_steps_is_bounded_no_claim_rests_on_it() -> None:
+    """The bounds from above say nothing then: no action is called best, whatever the values are."""
+    table: Table = {
+        0: {"risky": ([(0.5, 2), (0.5, 3)], 0.0), "safe": ([(0.9, 1), (0.1, 3)], 0.0)},
+        1: {"on": ([(0.9, 2), (0.1, 3)], 0.0)},
+        2: {"stay": ([(1.0, 2)], 0.0)},
+        3: {"stay": ([(1.0, 3)], 0.0)},
+    }
+    problem = problem_of(table, OBJECTIVES["safest"], goals=[2], hazards=[3])
+    whole = solve(problem)
+    within = np.minimum(whole.upper[0] + 1e-7, 1.0)
+    known = np.array([[False, False, True, True]])
+    limited = replace(
+        whole,
+        outcome=Outcome.HORIZON,
+        upper=np.where(known, whole.upper, 1.0),
+        policy_upper=np.where(known, whole.policy_upper, 1.0),
+        horizon=100_000,
+        within=within,
+    )
+    found = {}
+    for solution in (whole, limited):
+        explanation = explain(solution)
+        document = json.loads(json.dumps(to_document(explanation, narrate(explanation))))
+        assert not verify(document, problem).fails
+        found[solution.outcome] = {claim["claim"] for step in document["steps"] for claim in step["claims"]}
+        assert document["outcome"] == solution.outcome.value
+    assert "best" in found[Outcome.CERTIFIED]
+    assert not found[Outcome.HORIZON] & {"best", "among the best", "right start only", "not best"}
+    assert "100,000" not in document["text"]
 
 
 def test_the_digest_covers_everything_but_itself(contrastive: Document) -> None:

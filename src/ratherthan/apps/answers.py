@@ -10,8 +10,10 @@ import click
 from ratherthan.apps.door import one_line
 
 if TYPE_CHECKING:
+    from ratherthan.errors import LimitError
     from ratherthan.model.objective import Objective, Threshold
     from ratherthan.model.problem import Problem
+    from ratherthan.model.world import World
     from ratherthan.solve import Solution
     from ratherthan.verify import Verdicts
 
@@ -30,11 +32,14 @@ __all__ = [
 MOST_LISTED = 20
 
 
-def value_document(solution: Solution, wish: Objective | Threshold) -> dict[str, Any]:
+def value_document(solution: Solution, wish: Objective | Threshold, limit: LimitError | None = None) -> dict[str, Any]:
     """Return the value at the start with its bounds; of a yes-or-no property, whether it holds.
 
+    Where a limit stopped the solver there is no value but where the bounds meet, and it is said which limit.
+
     The bounds are those of the number, also where the value is true, false or null (undecided); null where not proved. Of
-    several objectives in order they are those of the first; ``levels`` has all.
+    several objectives in order they are those of the first; ``levels`` has all. ``horizon`` and ``upper_within_horizon`` tell what no
+    plan of so many steps exceeds, where nothing is proved beyond that.
     """
     from ratherthan.model.objective import Threshold
     from ratherthan.model.states import start_of
@@ -49,6 +54,9 @@ def value_document(solution: Solution, wish: Objective | Threshold) -> dict[str,
         {"property": level.text} | _bounded(float(values[k, start]), float(lowers[k, start]), float(uppers[k, start]))
         for k, level in enumerate(solution.objectives)
     ]
+    if limit is not None:
+        for level in levels:
+            level["value"] = level["value"] if level["lower"] == level["upper"] else None
     first = {key: levels[0][key] for key in ("value", "lower", "upper")}
     if isinstance(wish, Threshold):
         first["value"] = decided(wish, float(lowers[0, start]), float(uppers[0, start]))
@@ -61,6 +69,13 @@ def value_document(solution: Solution, wish: Objective | Threshold) -> dict[str,
         "message": solution.outcome.value,
         "engine": solution.engine,
     }
+    if solution.horizon is not None and solution.within is not None and not solution.given:
+        document |= {"horizon": solution.horizon, "upper_within_horizon": float(solution.within[start])}
+    if limit is not None:
+        document |= {
+            "message": f"{limit.place.get('reached', limit.message)} {solution.outcome.value}",
+            "limit": limit.place["limit"],
+        }
     return document | ({"levels": levels} if len(levels) > 1 else {})
 
 
@@ -90,7 +105,8 @@ def decided(wish: Threshold, lower: float, upper: float) -> bool | None:
 def value_lines(document: Mapping[str, Any], text: str) -> Iterator[str]:
     """Yield a value for people."""
     value = document["value"]
-    spelled = {True: "true", False: "false", None: "undecided"}[value] if isinstance(value, bool | None) else value
+    unknown = "not known" if "limit" in document else "undecided"
+    spelled = {True: "true", False: "false", None: unknown}[value] if isinstance(value, bool | None) else value
     bounds = [document[key] if document[key] is not None else "not proved" for key in ("lower", "upper")]
     sizes = ", ".join(f"{document[key]} {key}" for key in ("states", "choices", "branches"))
     yield from _pairs(
@@ -99,6 +115,7 @@ def value_lines(document: Mapping[str, Any], text: str) -> Iterator[str]:
             "value": str(spelled),
             "lower": str(bounds[0]),
             "upper": str(bounds[1]),
+            **_horizon_text(document),
             **{f"level {k}": _level_text(level) for k, level in enumerate(document.get("levels", [])[1:], 2)},
             "model": sizes,
             "outcome": document["message"],
@@ -107,10 +124,18 @@ def value_lines(document: Mapping[str, Any], text: str) -> Iterator[str]:
     )
 
 
+def _horizon_text(document: Mapping[str, Any]) -> dict[str, str]:
+    """Return what holds of plans of a limited number of steps, where that is known."""
+    if "horizon" not in document:
+        return {}
+    return {"horizon": f"at most {document['upper_within_horizon']} within {document['horizon']:,} steps"}
+
+
 def _level_text(level: Mapping[str, Any]) -> str:
     """Return the value of a further level with its bounds and property."""
     lower, upper = ("not proved" if level[key] is None else level[key] for key in ("lower", "upper"))
-    return f"{level['value']} (between {lower} and {upper}): {one_line(level['property'])}"
+    value = "not known" if level["value"] is None else level["value"]
+    return f"{value} (between {lower} and {upper}): {one_line(level['property'])}"
 
 
 def _pairs(table: Mapping[str, str]) -> Iterator[str]:
@@ -136,9 +161,10 @@ def info_document(problem: Problem) -> dict[str, Any]:
         "properties": {name: wish.text for name, wish in problem.properties.items()},
         "objective": _own_objective(problem),
         "definitions": dict(problem.definitions),
+        "lacks": problem.lacks,
         "world": None
         if world is None
-        else {"title": world.title, "note": world.note, "width": world.width, "height": world.height},
+        else {"title": world.title, "note": world.note, "width": world.width, "height": world.height} | _lies(world),
         "notes": list(problem.notes),
     }
 
@@ -152,6 +178,16 @@ def _own_objective(problem: Problem) -> str | None:
         return choose_objective(problem).text
     except PropertyError:
         return None
+
+
+def _lies(world: World) -> dict[str, Any]:
+    """Return where a map lies in the world, in metres."""
+    frame = world.frame
+    if frame is None:
+        return {}
+    corners = [frame.at(a * world.width, b * world.height, world.height) for a in (0, 1) for b in (0, 1)]
+    x, y = ([round(f(corner[i] for corner in corners), 9) for f in (min, max)] for i in (0, 1))
+    return {"resolution": frame.resolution, "x": x, "y": y}
 
 
 def info_lines(document: Mapping[str, Any]) -> Iterator[str]:
@@ -172,11 +208,15 @@ def info_lines(document: Mapping[str, Any]) -> Iterator[str]:
         "labels": _listed([f"{name} ({count})" for name, count in document["labels"].items()]),
         "rewards": _listed([f"{name} (by {', '.join(parts)})" for name, parts in document["rewards"].items()]),
         "definitions": _listed([f"{name} = {text}" for name, text in document["definitions"].items()]),
-        "objective": document["objective"] or "none of its own: give --property",
+        "objective": document["objective"]
+        or ("none of its own: give --goal" if document["lacks"] else "none of its own: give --property"),
     }
     if world is not None:
         title = ", ".join(part for part in (world["title"], world["note"]) if part)
-        rows["map"] = f"{world['width']} × {world['height']} cells" + (f": {title}" if title else "")
+        side = f" of {world['resolution']:g} m" if "resolution" in world else ""
+        rows["map"] = f"{world['width']} × {world['height']} cells{side}" + (f": {title}" if title else "")
+        if "x" in world:
+            rows["in metres"] = "x from {:g} to {:g}, y from {:g} to {:g}".format(*world["x"], *world["y"])
     yield from _pairs({key: one_line(text) for key, text in rows.items()})
     for key, texts in (
         ("properties", [f"{name}: {text}" for name, text in document["properties"].items()]),

@@ -5,7 +5,7 @@ What every command does first, in an order in which a slip of the person is told
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +15,14 @@ from ratherthan.apps.waiting import waiting
 if TYPE_CHECKING:
     from ratherthan.apps.columns import Column
     from ratherthan.explain import Explanation, Question
+    from ratherthan.factors import Counts
     from ratherthan.model.objective import Objective, Threshold
     from ratherthan.model.problem import Problem
     from ratherthan.solve import Solution
 
 __all__ = ["answer_of", "explanation_of", "factor_table_of", "problem_of"]
+
+MILLION = 1_000_000
 
 
 def problem_of(wanted: Wanted) -> Problem:
@@ -27,7 +30,13 @@ def problem_of(wanted: Wanted) -> Problem:
     from ratherthan.io import read
 
     with waiting(f"Reading {wanted.source}"):
-        problem = read(wanted.source, constants=wanted.constants, start=wanted.start, properties=wanted.properties)
+        problem = read(
+            wanted.source,
+            constants=wanted.constants,
+            start=wanted.start,
+            properties=wanted.properties,
+            **wanted.drive,
+        )
     if wanted.lexicon is None:
         return problem
     from ratherthan.apps.door import say
@@ -41,11 +50,17 @@ def problem_of(wanted: Wanted) -> Problem:
     return replace(problem, lexicon=lexicon)
 
 
-def answer_of(wanted: Wanted, *, policy: str | None, minimise_q: bool) -> tuple[dict[str, Any], str]:
-    """Return the document of the value that is wanted, and the text of the property; Storm's where it is not ours to give."""
+def answer_of(
+    wanted: Wanted, late: Callable[[dict[str, Any], str], None], *, policy: str | None, minimise_q: bool
+) -> tuple[dict[str, Any], str]:
+    """Return the document of the value that is wanted, and the text of the property; Storm's where it is not ours to give.
+
+    Where a limit is reached in the middle of what cannot be interrupted, `late` takes both, from another thread.
+    """
     from ratherthan.apps.answers import value_document
     from ratherthan.apps.elsewhere import asked_of_storm, storm_document
-    from ratherthan.errors import NotExplainableError, PropertyError
+    from ratherthan.apps.limits import speaking
+    from ratherthan.errors import NotExplainableError, PropertyError, StoppedError
     from ratherthan.model.discounts import discount_taken
     from ratherthan.model.objective import Lexicographic, Threshold
     from ratherthan.model.states import start_of
@@ -62,8 +77,11 @@ def answer_of(wanted: Wanted, *, policy: str | None, minimise_q: bool) -> tuple[
         start_of(problem.mdp)
         objective = wish.objective if isinstance(wish, Threshold) else wish
         try:
-            solution = _solved(replace(problem, objective=objective), policy, minimise_q=minimise_q)
+            with speaking(lambda error: late(value_document(error.solution, wish, error), wish.text)):
+                solution = _solved(replace(problem, objective=objective), policy, minimise_q=minimise_q)
             return value_document(solution, wish), wish.text
+        except StoppedError as error:
+            return value_document(error.solution, wish, error), wish.text
         except NotExplainableError as error:
             reason, text = error, None if isinstance(wish, Lexicographic) else wish.text
     answer = asked_of_storm(problem, text, reason, policy)
@@ -72,6 +90,7 @@ def answer_of(wanted: Wanted, *, policy: str | None, minimise_q: bool) -> tuple[
 
 def explanation_of(wanted: Wanted, given: Mapping[str, Any]) -> Explanation:
     """Return the explanation that the options of ``ratherthan explain`` ask for."""
+    from ratherthan.apps.limits import with_value
     from ratherthan.explain import explain
     from ratherthan.model.states import start_of, state_number
 
@@ -81,14 +100,17 @@ def explanation_of(wanted: Wanted, given: Mapping[str, Any]) -> Explanation:
         start_of(problem.mdp)
     asked = _question(given, None if state is None else state_number(problem.mdp, state))
     solution = _solved(problem, given["policy"], minimise_q=given["minimise_q"])
-    with waiting("Explaining"):
+    with waiting("Explaining"), with_value(solution):
         return explain(solution, asked=asked, also=also)
 
 
 def factor_table_of(wanted: Wanted, given: Mapping[str, Any]) -> dict[str, Column]:
     """Return the table that the options of ``ratherthan factors`` ask for."""
-    from ratherthan.apps.columns import factor_columns, route_states
+    from ratherthan.apps.columns import counted_at, factor_columns, route_states
+    from ratherthan.apps.door import say
+    from ratherthan.apps.limits import with_value
     from ratherthan.explain import Factors
+    from ratherthan.factors import Effort
     from ratherthan.model.states import start_of, state_number
 
     problem, _ = _explainable(wanted)
@@ -96,9 +118,26 @@ def factor_table_of(wanted: Wanted, given: Mapping[str, Any]) -> dict[str, Colum
     states = {state_number(problem.mdp, state) for state in given["states"]}
     solution = _solved(problem, given["policy"], minimise_q=given["minimise_q"])
     factors = Factors(solution=solution, asked=asked)
-    with waiting("Counting the decisions left open"):
-        everywhere = given["constrictiveness"] == "all"
-        return factor_columns(factors, None if everywhere else states | route_states(factors, start))
+    effort = Effort(visits=given["work"] * MILLION, estimate=given["estimate"])
+    with waiting("Counting the decisions left open"), with_value(solution):
+        where = None if given["constrictiveness"] == "all" else states | route_states(factors, start)
+        counts = counted_at(factors, where, effort)
+        columns = factor_columns(factors, where, counts, estimates=effort.estimate)
+    if not counts.counted.all():
+        say(_spent(counts, given["work"], estimate=effort.estimate))
+    return columns
+
+
+def _spent(counts: Counts, work: int, *, estimate: bool) -> str:
+    """Return what is said where the work did not suffice."""
+    done, asked, guessed = int(counts.counted.sum()), len(counts.choices), int(counts.estimated.sum())
+    said = (
+        f"The decisions left open were counted for {done:,} of {asked:,} choices; then the work was spent (--work {work}). "
+        "The others have no constrictiveness in the table. Grant more work to count them."
+    )
+    if not estimate:
+        return said
+    return f"{said} For {guessed:,} of them constrictiveness_estimate holds a guess, which proves nothing."
 
 
 def _wish(wanted: Wanted, problem: Problem) -> Objective | Threshold:

@@ -4,15 +4,30 @@ from __future__ import annotations
 
 import importlib
 import sys
+from contextlib import suppress
 
 import click
 
-from ratherthan.apps.door import Door, silence
+from ratherthan.apps.door import Door, say, silence
+from ratherthan.apps.guard import stand_guard
 from ratherthan.apps.options import Command
+from ratherthan.model.compiling import tally
 
 __all__ = ["COMMANDS", "Ratherthan", "main", "run"]
 
-COMMANDS = ("explain", "factors", "solve", "tradeoffs", "verify", "info", "convert", "examples", "completion")
+COMMANDS = (
+    "explain",
+    "factors",
+    "solve",
+    "tradeoffs",
+    "verify",
+    "info",
+    "convert",
+    "examples",
+    "batch",
+    "warmup",
+    "completion",
+)
 
 
 class Ratherthan(Door):
@@ -42,7 +57,8 @@ class Ratherthan(Door):
 def main(context: click.Context) -> None:
     """Explain plans of Markov decision processes: why this action rather than that one.
 
-    A SOURCE is a bundled example (example:paper-5x5), a road map (.roadmap), a PRISM or JANI model, a UMB archive
+    A SOURCE is a bundled example (example:paper-5x5), a road map (.roadmap), a robot's map (MovingAI's .map, or the .yaml of the ROS
+    map server), a PRISM or JANI model, a UMB archive
     (.umb), a NumPy archive (.npz), Storm's explicit text (.drn), or a Gymnasium environment (gym:FrozenLake-v1, with arguments after commas:
     gym:FrozenLake-v1,map_name=8x8,is_slippery=false) or its table (.json.gz).
     """
@@ -51,9 +67,22 @@ def main(context: click.Context) -> None:
 
 
 def run() -> None:
-    """Run the command line of this process."""
+    """Run the command line of this process, which signals end within a second."""
+    standing = stand_guard(say)
+    tally.announce = say
     try:
         main(prog_name="ratherthan")
     except KeyboardInterrupt:
         silence(sys.stdout, sys.stderr)
-        sys.exit(130)
+        standing.end(standing.code)
+    except SystemExit as leaving:
+        if (
+            leaving.code == 1 and standing.limit_reached
+        ):  # all is told: nobody waits for workers to be closed in good order
+            with suppress(OSError, ValueError):
+                sys.stdout.flush()
+            standing.end(1)
+        raise
+    finally:
+        if standing.signal:  # nothing is waited for, not even that a large model is forgotten
+            standing.end(standing.code)

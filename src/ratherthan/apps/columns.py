@@ -6,7 +6,7 @@ held as text.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,24 +17,38 @@ from ratherthan.model.names import StateNames, spell
 
 if TYPE_CHECKING:
     from ratherthan.explain import Factors
-    from ratherthan.model.mdp import MDP, Bools
+    from ratherthan.factors import Counts, Effort
+    from ratherthan.model.mdp import MDP
 
-__all__ = ["BLOCK", "KEYS", "Column", "action_names", "blocks", "factor_columns", "route_states", "state_names"]
+__all__ = [
+    "BLOCK",
+    "KEYS",
+    "Column",
+    "action_words",
+    "blocks",
+    "counted_at",
+    "factor_columns",
+    "route_states",
+    "state_names",
+]
 
 KEYS = (
     *("state", "state_name", "choice", "choice_index", "action", "impact", "action_value", "lower", "upper"),
     *("lambda_min", "lambda_max", "responsibility", "constrictiveness", "critical", "taken"),
 )
 BLOCK = 4096
+FEW_CHOICES = 16
+"""Up to so many choices of a state each is compared with all before it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Column:
-    """One column: an array or names by row, and where it is null."""
+    """One column: an array, names or words by row, and where it is null."""
 
-    values: npt.NDArray[Any]  # [C]; for names the index into `names`
+    values: npt.NDArray[Any]  # [C]; for names and words the index into these
     null: npt.NDArray[np.bool_] | None = None  # [C]
     names: StateNames | None = None
+    words: Sequence[str] | None = None
 
     def rows(self, first: int, last: int) -> list[Any]:
         """Return rows `first` up to, not including, `last` as Python values; None where null."""
@@ -42,12 +56,16 @@ class Column:
         if self.names is not None:
             return state_names(self.names, part)
         listed: list[Any] = part.tolist()
+        if self.words is not None:
+            listed = list(map(self.words.__getitem__, listed))
         if self.null is not None:
             listed = [None if gone else value for value, gone in zip(listed, self.null[first:last], strict=True)]
         return listed
 
 
-def factor_columns(factors: Factors, states: Iterable[int] | None) -> dict[str, Column]:
+def factor_columns(
+    factors: Factors, states: Iterable[int] | None, counts: Counts | None = None, *, estimates: bool = False
+) -> dict[str, Column]:
     """Return the columns of `KEYS`, and for objectives in order those of the further levels: ``action_value_2`` and so on.
 
     ``compared_2`` tells which choices the second level compares, those equal to the best at the first; the extremes and the
@@ -58,19 +76,26 @@ def factor_columns(factors: Factors, states: Iterable[int] | None) -> dict[str, 
     factors : Factors
     states : iterable of int, optional
         Where constrictiveness is counted: everywhere if None.
+    counts : Counts, optional
+        What was counted there; by default all of it.
+    estimates : bool
+        Add the columns ``constrictiveness_estimate`` and ``constrictiveness_estimate_error``, the standard error as a share.
     """
+    from ratherthan.factors import Effort
+
     mdp, measures, solution = factors.solution.problem.mdp, factors.measures, factors.solution
     state = np.repeat(np.arange(mdp.states), np.diff(mdp.state_to_choices))
     choice = np.arange(mdp.choices)
     critical = factors.critical
-    counts, unknown = _counts(factors, state, states)
+    action, words = action_words(mdp)
+    found = counts or counted_at(factors, states, Effort())
     lower, upper = measures.lower, measures.upper
     return {
         "state": Column(values=state),
         "state_name": Column(values=state, names=mdp.names),
         "choice": Column(values=choice),
         "choice_index": Column(values=choice - mdp.state_to_choices[state]),
-        "action": Column(values=action_names(mdp)),
+        "action": Column(values=action, words=words),
         "impact": Column(values=measures.impact),
         "action_value": Column(values=measures.action_value),
         "lower": Column(values=lower, null=np.isneginf(lower) & ~np.isneginf(upper)),
@@ -78,9 +103,10 @@ def factor_columns(factors: Factors, states: Iterable[int] | None) -> dict[str, 
         "lambda_min": Column(values=measures.lambda_min[state]),
         "lambda_max": Column(values=measures.lambda_max[state]),
         "responsibility": Column(values=measures.responsibility),
-        "constrictiveness": Column(values=counts, null=unknown),
+        "constrictiveness": _spread(mdp, found, found.lower, found.lower == found.upper),
         "critical": Column(values=critical.certain[state], null=(critical.possible & ~critical.certain)[state]),
         "taken": Column(values=solution.policy.weights(mdp) > 0),
+        **({} if not estimates else _estimates(mdp, found)),
         **_further_levels(factors, state),
     }
 
@@ -112,17 +138,28 @@ def _further_levels(factors: Factors, state: npt.NDArray[np.int64]) -> dict[str,
     return found
 
 
-def _counts(
-    factors: Factors, state: npt.NDArray[np.int64], states: Iterable[int] | None
-) -> tuple[npt.NDArray[np.int64], Bools]:
-    """Return ε of the choices of `states`, and where it is not known: elsewhere, and where bounds leave it open."""
-    wanted = np.ones(len(state), dtype=bool)
-    if states is not None:
-        wanted = np.isin(state, np.fromiter(states, dtype=np.int64))
-    counts, unknown = np.zeros(len(state), dtype=np.int64), ~wanted
-    for choice, found in factors.counts(np.flatnonzero(wanted).tolist()).items():
-        counts[choice], unknown[choice] = found.lower, found.count is None
-    return counts, unknown
+def counted_at(factors: Factors, states: Iterable[int] | None, effort: Effort) -> Counts:
+    """Return ε of the choices of `states`, of all if None, with no more work than is granted."""
+    mdp = factors.solution.problem.mdp
+    if states is None:
+        return factors.counted(np.arange(mdp.choices), effort)
+    own = [np.arange(mdp.state_to_choices[s], mdp.state_to_choices[s + 1]) for s in sorted(states)]
+    return factors.counted(np.concatenate([np.zeros(0, dtype=np.int64), *own]), effort)
+
+
+def _spread(mdp: MDP, counts: Counts, values: npt.NDArray[Any], known: npt.NDArray[np.bool_]) -> Column:
+    """Return a column of what is known of the choices that were counted; null elsewhere."""
+    column, null = np.zeros(mdp.choices, dtype=values.dtype), np.ones(mdp.choices, dtype=np.bool_)
+    column[counts.choices], null[counts.choices] = values, ~known
+    return Column(values=column, null=null)
+
+
+def _estimates(mdp: MDP, counts: Counts) -> dict[str, Column]:
+    """Return the columns of estimates: they are no counts, and their names say so."""
+    return {
+        "constrictiveness_estimate": _spread(mdp, counts, counts.estimate, counts.estimated),
+        "constrictiveness_estimate_error": _spread(mdp, counts, counts.error, counts.estimated),
+    }
 
 
 def route_states(factors: Factors, start: int) -> set[int]:
@@ -138,8 +175,8 @@ def blocks(count: int, size: int = BLOCK) -> Iterator[tuple[int, int]]:
         yield first, min(first + size, count)
 
 
-def action_names(mdp: MDP) -> npt.NDArray[np.object_]:
-    """Return the shown name of every choice, ``[C]``: what `MDP.action_name` says of one, for all at once."""
+def action_words(mdp: MDP) -> tuple[npt.NDArray[np.int64], list[str]]:
+    """Return the shown name of every choice as a number, ``[C]``, into a list: what `MDP.action_name` says of one, for all."""
     state = np.repeat(np.arange(mdp.states), np.diff(mdp.state_to_choices))
     index = np.arange(mdp.choices) - mdp.state_to_choices[state]
     unnamed = mdp.choice_to_action < 0
@@ -150,16 +187,31 @@ def action_names(mdp: MDP) -> npt.NDArray[np.object_]:
     code_of = {name: code for code, name in reversed(list(enumerate(spelled)))}
     same = np.array([code_of[name] for name in spelled], dtype=np.int64)
     code = same[np.where(unnamed, len(mdp.actions) + index, mdp.choice_to_action)]
-    names = np.array(spelled, dtype=object)[code]
+    earlier = _earlier(state, index, code)
+    again = np.flatnonzero(earlier)
+    if len(again):
+        pairs, at = np.unique(np.stack([code[again], earlier[again]]), axis=1, return_inverse=True)
+        code[again] = len(spelled) + at.ravel()
+        spelled += [f"{spelled[c]} ({k + 1})" for c, k in pairs.T.tolist()]
+    return code, spelled
+
+
+def _earlier(
+    state: npt.NDArray[np.int64], index: npt.NDArray[np.int64], code: npt.NDArray[np.int64]
+) -> npt.NDArray[np.int64]:
+    """Return how many choices before it in its state have the code of each choice, ``[C]``."""
+    earlier = np.zeros(len(code), dtype=np.int64)
+    most = int(index.max(initial=0))
+    if most <= FEW_CHOICES:
+        for back in range(1, most + 1):
+            earlier[back:] += (code[back:] == code[:-back]) & (index[back:] >= back)
+        return earlier
     order = np.lexsort((code, state))
     begins = np.ones(len(order), dtype=bool)
     begins[1:] = (state[order][1:] != state[order][:-1]) | (code[order][1:] != code[order][:-1])
     starts = np.flatnonzero(begins)
-    earlier = np.empty(len(order), dtype=np.int64)
     earlier[order] = np.arange(len(order)) - np.repeat(starts, np.diff([*starts, len(order)]))
-    again = np.flatnonzero(earlier)
-    names[again] = [f"{names[c]} ({earlier[c] + 1})" for c in again]
-    return names
+    return earlier
 
 
 def state_names(names: StateNames, states: npt.NDArray[Any]) -> list[str]:

@@ -5,8 +5,8 @@ code
 ==== ===================================================================
 0    an answer, also "there is no way"; a reader who left early
 2    bad input: a file, model, property, question or option
-1    a fault of the program, or a solver that did not converge
-130  interrupted
+1    a fault of the program, or a limit of time or memory that was reached before there was an answer
+130  interrupted; 143 ended by another process
 ==== ===================================================================
 """
 
@@ -19,6 +19,8 @@ from contextlib import suppress
 from typing import Any, TextIO
 
 import click
+
+from ratherthan.apps import guard
 
 __all__ = ["Door", "one_line", "say", "silence"]
 
@@ -48,12 +50,22 @@ class Door(click.Group):
                 raise
             silence(sys.stdout, sys.stderr)
             code = 0
-        except (click.Abort, KeyboardInterrupt):
-            silence(sys.stdout, sys.stderr)
-            code = 130
+        except (click.Abort, KeyboardInterrupt) as interrupt:
+            code = _interrupted(interrupt)
         except Exception as error:  # noqa: BLE001 - here every error becomes a line for the person who typed
-            code = _refused(error)
+            cause = error if guard.guard is None else guard.guard.cause(error)
+            code = _refused(cause) if isinstance(cause, Exception) else _interrupted(cause)
         sys.exit(code)
+
+
+def _interrupted(interrupt: BaseException) -> int:
+    """Say nothing more and return the exit code."""
+    silence(sys.stdout, sys.stderr)
+    return (
+        130
+        if guard.guard is None or (isinstance(interrupt, click.Abort) and interrupt.__cause__ is None)
+        else guard.guard.code
+    )
 
 
 def _refused(error: Exception) -> int:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import click
 
+from ratherthan.apps.driving import driving_options
+
 __all__ = ["Command", "Option", "Wanted", "argument", "measure_options", "option", "output_options", "source_options"]
 
-SECTIONS = ("Arguments", "Question", "Policy", "Source", "Output", "Other")
+SECTIONS = ("Arguments", "Question", "Policy", "Source", "Maps (.map, .yaml)", "Output", "Limits", "Other")
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -73,6 +75,8 @@ class Wanted:
         As often as ``--property`` was given.
     discount : float, optional
     constants, start, lexicon : str, optional
+    drive : mapping
+        What was asked of a robot on a map of cells, by the names that `ratherthan.read` takes.
     """
 
     source: str
@@ -81,6 +85,7 @@ class Wanted:
     constants: str | None = None
     start: str | None = None
     lexicon: str | None = None
+    drive: Mapping[str, Any] = field(default_factory=dict)
 
 
 def option(*names: str, section: str, **settings: Any) -> Callable[[F], F]:
@@ -120,7 +125,7 @@ _SOURCE: Mapping[str, Callable[[F], F]] = {
         "--start",
         section="Source",
         metavar="STATE",
-        help="The state to begin in, a number from 0 or an exact name.  [default: the initial state]",
+        help="The state to begin in, a number from 0 or an exact name; on a map a place.  [default: the initial state]",
     ),
     "lexicon": option(
         "--lexicon",
@@ -131,16 +136,42 @@ _SOURCE: Mapping[str, Callable[[F], F]] = {
 }
 
 
+_DRIVING = driving_options(option)
+
+
+_PRECISION = option(
+    "--precision",
+    section="Limits",
+    type=float,
+    metavar="P",
+    help="The relative width of bounds that is enough; what a sentence must compare is found out more precisely where it is open.  "
+    "[default: 1e-6]",
+)
+
+
 def source_options(*keys: str) -> Callable[[F], Callable[..., Any]]:
     """Decorate a command with SOURCE and some of its options; they arrive as one `Wanted`, the first argument."""
 
     def decorate(command: F) -> Callable[..., Any]:
         @functools.wraps(command)
         def gathered(**given: Any) -> Any:
-            wanted = Wanted(source=given.pop("source"), **{key: given.pop(key) for key in keys})
-            return command(wanted, **given)
+            from ratherthan.apps.limits import limited
+            from ratherthan.solve.precise import aiming
 
-        decorated: Callable[..., Any] = gathered
+            if given.get("output") not in (None, "", "-"):
+                from ratherthan.io._files import check_target
+
+                check_target(given["output"], unlike=given["source"])
+            drive = {key: value for key in _DRIVING if (value := given.pop(key)) is not None}
+            wanted = Wanted(source=given.pop("source"), drive=drive, **{key: given.pop(key) for key in keys})
+            with aiming(given.pop("precision", None)), limited(given.pop("time_limit"), given.pop("memory_limit")):
+                return command(wanted, **given)
+
+        decorated: Callable[..., Any] = _limit_options(gathered)
+        if "properties" in keys:
+            decorated = _PRECISION(decorated)
+        for add in reversed(list(_DRIVING.values())):
+            decorated = add(decorated)
         for key in reversed(keys):
             decorated = _SOURCE[key](decorated)
         return argument(
@@ -149,6 +180,26 @@ def source_options(*keys: str) -> Callable[[F], Callable[..., Any]]:
         )(decorated)
 
     return decorate
+
+
+def _limit_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorate a command with how long it may take, and how much memory."""
+    from ratherthan.apps.limits import Amount, Duration
+
+    command = option(
+        "--memory-limit",
+        section="Limits",
+        type=Amount(),
+        metavar="SIZE",
+        help="Stop before more memory is held than that: 500MB, 4GB.  [default: what the machine has]",
+    )(command)
+    return option(
+        "--time-limit",
+        section="Limits",
+        type=Duration(),
+        metavar="TIME",
+        help="Stop after this time, 10s, 2m or 1h, and say what is known by then.  [default: none]",
+    )(command)
 
 
 def measure_options(command: F) -> F:

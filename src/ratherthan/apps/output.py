@@ -67,12 +67,12 @@ def send_lines(lines: Iterable[str], output: str | None = None) -> None:
     send(((line if colour else click.unstyle(line)) + "\n" for line in lines), output)
 
 
-def send(parts: Iterable[str | bytes], output: str | None = None) -> None:
+def send(parts: Iterable[str | bytes | bytearray], output: str | None = None) -> None:
     """Send the parts of an answer, text as UTF-8, to standard output or into a file.
 
     Parameters
     ----------
-    parts : iterable of str or bytes
+    parts : iterable of str, bytes or bytearray
         May be made on the way: a long table is never held whole.
     output : str, optional
         A file, written whole or not at all; ``-`` is standard output.
@@ -83,7 +83,7 @@ def send(parts: Iterable[str | bytes], output: str | None = None) -> None:
         Where they cannot be written.
     """
     # A lone surrogate, which JSON may smuggle into a name, has no bytes in UTF-8: it stays an escape, as in JSON.
-    chunks = (part if isinstance(part, bytes) else part.encode("utf-8", "backslashreplace") for part in parts)
+    chunks = (part.encode("utf-8", "backslashreplace") if isinstance(part, str) else part for part in parts)
     if output is None or output == "-":
         _to_standard_output(chunks)
     elif Path(output).exists() and not Path(output).is_file() and not Path(output).is_dir():
@@ -95,7 +95,7 @@ def send(parts: Iterable[str | bytes], output: str | None = None) -> None:
             file.writelines(chunks)
 
 
-def _to_device(output: str, chunks: Iterable[bytes]) -> None:
+def _to_device(output: str, chunks: Iterable[bytes | bytearray]) -> None:
     """Write to a device or a pipe, which a file cannot replace."""
     try:
         with Path(output).open("wb") as device:
@@ -105,7 +105,7 @@ def _to_device(output: str, chunks: Iterable[bytes]) -> None:
         raise SourceError(f"The output must be writable, but '{output}' is not: {reason}.", path=output) from error
 
 
-def _to_standard_output(chunks: Iterable[bytes]) -> None:
+def _to_standard_output(chunks: Iterable[bytes | bytearray]) -> None:
     """Write to standard output; a reader who left is no error."""
     if sys.stdout is None:  # closed by whoever started us
         return

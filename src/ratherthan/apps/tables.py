@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import io
-import json
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from ratherthan.apps.columns import Column, blocks
+import numpy as np
+
+from ratherthan.apps.columns import Column, blocks, state_names
 from ratherthan.apps.door import one_line
+from ratherthan.apps.spelling import csv_parts, json_parts
 from ratherthan.errors import MissingExtraError
+from ratherthan.model.watch import look
 
 __all__ = ["aligned", "csv_parts", "json_parts", "need_parquet", "parquet_parts", "parts_of", "shown", "table_parts"]
 
@@ -20,11 +21,13 @@ EXACT = ("choice_index", "lower", "upper")
 """Columns that the table for people leaves out: they say more than six digits do."""
 
 
-def parts_of(form: str, columns: Mapping[str, Column]) -> Iterator[str] | Iterator[bytes]:
+def parts_of(form: str, columns: Mapping[str, Column]) -> Iterator[str] | Iterator[bytes | bytearray]:
     """Return the parts of a table as ``"table"``, ``"json"``, ``"csv"`` or ``"parquet"``."""
     if form == "parquet":
         return parquet_parts(columns)
-    return {"table": table_parts, "json": json_parts, "csv": csv_parts}[form](columns)
+    if form == "table":
+        return table_parts(columns)
+    return json_parts(columns) if form == "json" else csv_parts(columns)
 
 
 def table_parts(columns: Mapping[str, Column]) -> Iterator[str]:
@@ -58,44 +61,6 @@ def shown(value: object, key: str = "") -> str:
     return f"{value:.6g}" if isinstance(value, float) else one_line(str(value))
 
 
-def json_parts(columns: Mapping[str, Column]) -> Iterator[str]:
-    """Yield ``{"rows": [...]}``, a row a line; infinite numbers as "inf" and "-inf"."""
-    yield '{"rows": ['
-    encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
-    before = "\n  "
-    for first, last in blocks(_count(columns)):
-        parts = [list(map(_json_value, column.rows(first, last))) for column in columns.values()]
-        rows = [encode(dict(zip(columns, row, strict=True))) for row in zip(*parts, strict=True)]
-        if rows:
-            yield before + ",\n  ".join(rows)
-            before = ",\n  "
-    yield "\n]}\n"
-
-
-def _json_value(value: object) -> object:
-    if isinstance(value, float) and math.isinf(value):
-        return "inf" if value > 0 else "-inf"
-    return value
-
-
-def csv_parts(columns: Mapping[str, Column]) -> Iterator[str]:
-    """Yield comma-separated values with a line of names: null is empty, truth is true or false, infinity inf."""
-    for first, last in blocks(_count(columns)):
-        buffer = io.StringIO()
-        writer = csv.writer(buffer, lineterminator="\n")
-        if first == 0:
-            writer.writerow(columns)
-        parts = [list(map(_csv_value, column.rows(first, last))) for column in columns.values()]
-        writer.writerows(zip(*parts, strict=True))
-        yield buffer.getvalue()
-
-
-def _csv_value(value: object) -> object:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return value
-
-
 def need_parquet() -> None:
     """Raise MissingExtraError where the library that writes Parquet is not installed."""
     try:
@@ -107,20 +72,44 @@ def need_parquet() -> None:
         ) from error
 
 
-def parquet_parts(columns: Mapping[str, Column]) -> Iterator[bytes]:
-    """Yield a Parquet file with the same columns; it needs pyarrow."""
+def parquet_parts(columns: Mapping[str, Column]) -> Iterator[bytes | bytearray]:
+    """Yield a Parquet file with the same columns, as it is made; it needs pyarrow."""
     need_parquet()
     import pyarrow as pa
     from pyarrow import parquet
 
-    count = _count(columns)
-    buffer = pa.BufferOutputStream()
     schema = pa.schema([(key, _parquet_type(key, pa)) for key in columns])
-    with parquet.ParquetWriter(buffer, schema) as writer:
-        for first, last in blocks(count, 1 << 17):
+    made = _Made()
+    repeating = [key for key, column in columns.items() if column.names is not None or column.words is not None]
+    with parquet.ParquetWriter(pa.PythonFile(made, mode="w"), schema, use_dictionary=repeating) as writer:
+        for first, last in blocks(_count(columns), 1 << 17):
+            look()
             arrays = [_parquet_array(columns[key], schema.field(key).type, first, last, pa) for key in columns]
             writer.write_table(pa.table(arrays, schema=schema))
-    yield buffer.getvalue().to_pybytes()
+            yield made.taken()
+    yield made.taken()
+
+
+class _Made(io.RawIOBase):
+    """What a writer has made and nobody has taken yet."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+
+    def writable(self) -> bool:
+        """Whether it can be written to."""
+        return True
+
+    def write(self, data: Any) -> int:
+        """Keep some bytes."""
+        self._parts.append(bytes(data))
+        return len(self._parts[-1])
+
+    def taken(self) -> bytes:
+        """Return what was made, and forget it."""
+        made = b"".join(self._parts)
+        self._parts.clear()
+        return made
 
 
 def _parquet_type(key: str, pa: Any) -> Any:
@@ -132,11 +121,27 @@ def _parquet_type(key: str, pa: Any) -> Any:
 
 
 def _parquet_array(column: Column, kind: Any, first: int, last: int, pa: Any) -> Any:
-    if column.names is not None or column.values.dtype == object:
-        texts = [text.encode("utf-8", "backslashreplace").decode() for text in column.rows(first, last)]
-        return pa.array(texts, type=kind)
+    values = column.values[first:last]
+    if column.names is not None or column.words is not None:
+        return _parquet_texts(column, values, kind, pa)
     null = None if column.null is None else column.null[first:last]
-    return pa.array(column.values[first:last], type=kind, mask=null)
+    return pa.array(values, type=kind, mask=null)
+
+
+def _parquet_texts(column: Column, values: Any, kind: Any, pa: Any) -> Any:
+    """Return names or words, each that follows itself made once."""
+    if column.words is not None:
+        used, at = np.unique(values, return_inverse=True)
+        texts = [column.words[code] for code in used.tolist()]
+    else:
+        begins = np.append(True, values[1:] != values[:-1])[: len(values)]
+        at = np.cumsum(begins) - 1
+        texts = state_names(column.names, values[begins]) if column.names is not None else []
+    return (
+        pa.array([text.encode("utf-8", "backslashreplace") for text in texts], type=pa.binary())
+        .cast(kind)
+        .take(pa.array(at))
+    )
 
 
 def _count(columns: Mapping[str, Column]) -> int:

@@ -7,21 +7,24 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from ratherthan.errors import PolicyError, QuestionError
 from ratherthan.explain.claims import flexibility, flexibility_against
-from ratherthan.explain.explanation import Claim, Closing, Explanation, Step, Trade
+from ratherthan.explain.explanation import Alternative, Claim, Closing, Explanation, Step, Trade
 from ratherthan.explain.further import View, further_objectives, views_of
 from ratherthan.explain.levels import Judges
 from ratherthan.explain.measures import Factors
 from ratherthan.explain.obstacles import in_the_way
+from ratherthan.explain.openings import openings
 from ratherthan.explain.question import Question, question
 from ratherthan.explain.recording import recorded
-from ratherthan.explain.route import PolicyGraph, Route, policy_graph, route_from
+from ratherthan.explain.route import PolicyGraph, Route, route_from
+from ratherthan.explain.shared import arriving, graph_of, reached_from
 from ratherthan.explain.trades import trade_of
-from ratherthan.factors import Interval
 from ratherthan.model.objective import Level, Objective
 from ratherthan.solve.solution import Solution
-from ratherthan.solve.solver import arrival
+from ratherthan.solve.solver import sharpened
 
 __all__ = ["explain", "initial_state"]
 
@@ -77,7 +80,14 @@ def explain(
         also = (also,)
     if not isinstance(also, Iterable):
         raise QuestionError(f"Further objectives must be a list of objectives or properties, got {also!r}.")
-    return _Explainer(solution=solution, asked=asked, also=further_objectives(solution, also)).explanation()
+    wishes = further_objectives(solution, also)
+    found = _Explainer(solution=solution, asked=asked, also=wishes).explanation()
+    while any(step.critical is None for step in found.steps):  # narrower bounds may decide what is open
+        finer = sharpened(solution)
+        if finer is None:
+            break
+        solution, found = finer, _Explainer(solution=finer, asked=asked, also=wishes).explanation()
+    return found
 
 
 def initial_state(solution: Solution) -> int:
@@ -118,9 +128,9 @@ class _Explainer:
     def views(self) -> tuple[View, ...]:
         return views_of(self.solution, self.also) if self.also else ()
 
-    @cached_property
+    @property
     def graph(self) -> PolicyGraph:
-        return policy_graph(self.solution)
+        return graph_of(self.solution)
 
     def explanation(self) -> Explanation:
         start = initial_state(self.solution) if self.asked.state is None else self._known(self.asked.state)
@@ -149,25 +159,25 @@ class _Explainer:
     def _of_route(self, start: int) -> Explanation:
         route = route_from(self.solution, self.graph, start)
         steps = self._steps(route)
-        lower, upper = arrival(
-            self.solution.problem.mdp, self.solution.policy, self.solution.goal, self.solution.hazard
-        )
-        low, high = max(0.0, float(lower[start])), min(1.0, float(upper[start]))
-        arriving = Interval(value=(low + high) / 2, lower=low, upper=high)
         return self._record(
             start,
             route=route.states,
             route_outcome=route.outcome,
             route_probability=min(1.0, route.probability),
-            arrival=None if route.outcome == "open end" else arriving,
+            arrival=None if route.outcome == "open end" else arriving(self.solution, start),
             circle=route.circle[:MOST_NAMED],
             circle_size=len(route.circle),
             circle_certain=route.certain,
-            in_the_way=in_the_way(self.solution, start) if route.outcome == "no way" else (),
+            **(self._blocked(start) if route.outcome == "no way" else {}),
             totals=tuple(view.value(start) for view in self.views),
             steps=steps,
             closing=self._closing(route, steps),
         )
+
+    def _blocked(self, start: int) -> dict[str, Any]:
+        """Return the hazards in the way, or the closed cells of the map that would have to open."""
+        hazards = in_the_way(self.solution, start)
+        return {"in_the_way": hazards, "openings": () if hazards else openings(self.solution, start)}
 
     def _steps(self, route: Route) -> tuple[Step, ...]:
         """Return the steps of a route; claims only where a sentence may be said of them."""
@@ -207,19 +217,31 @@ class _Explainer:
         selective = "selectiveness" in self.asked.factors
         foil = None if self.asked.rather_than is None else self._foil(state, choice)
         others = [foil] if foil is not None else [c for c in mdp.choices_of(state) if c != choice]
+        critical = self.factors.critical.of(state) if selective else False
         return Step(
             state=state,
             choice=choice,
             choice_index=choice - mdp.choices_of(state).start,
             action=mdp.action_name(choice),
             share=share,
-            critical=self.factors.critical.of(state) if selective else False,
+            critical=critical,
             spread=self.judges.spread(state) if selective else None,
             further_spreads=self.factors.further_spreads(state) if selective else (),
             claims=tuple(self._claims(state, choice, foil)) if told else (),
             trades=self._trades(state, choice, others) if told else (),
             foil=None if foil is None else mdp.action_name(foil),
+            alternatives=self._alternatives(others) if foil is not None or (told and critical is not False) else (),
         )
+
+    def _alternatives(self, others: Sequence[int]) -> tuple[Alternative, ...]:
+        """Return where each of other choices most likely leads, the first listed branch of several."""
+        mdp, found = self.solution.problem.mdp, []
+        for other in others:
+            branches = mdp.branches_of(other)
+            likeliest = int(np.argmax(mdp.branch_to_probability[branches]))
+            towards = int(mdp.branch_to_target[branches][likeliest])
+            found.append(Alternative(action=mdp.action_name(other), towards=towards))
+        return tuple(found)
 
     def _claims(self, state: int, choice: int, foil: int | None) -> list[Claim]:
         """Return the claims of one step."""
@@ -272,7 +294,7 @@ class _Explainer:
         untold = sorted({step.state for step in steps if step.critical is False})
         equal = all(self.judges.equivalent(state) for state in untold)
         largest = None if not untold else 0.0 if equal else self._largest_difference(untold)
-        reachable = self.graph.reachable(route.states[0])
+        reachable = reached_from(self.solution, route.states[0]).copy()
         reachable[list(route.states)] = False
         certain = int((self.factors.critical.certain & reachable).sum())
         return Closing(
@@ -290,4 +312,4 @@ class _Explainer:
         return max(high.upper - low.lower for high, low in spreads) or None  # it is a further level that they change
 
     def _record(self, start: int, **parts: Any) -> Explanation:
-        return recorded(self.solution, self.asked, self.also, self.graph, start, **parts)
+        return recorded(self.solution, self.asked, self.also, start, **parts)

@@ -6,16 +6,19 @@ the names and places of the states it mentions and the words of the model.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ratherthan.explain.evidence import Claim, Evidence, Judged, Measured, Tally, Trade
+from ratherthan.explain.places import WorldRecord
+from ratherthan.explain.policy_rows import PolicyRows
 from ratherthan.explain.question import Question
 from ratherthan.factors import Interval
 from ratherthan.model.lexicon import Lexicon
 
 __all__ = [
     "VERSION",
+    "Alternative",
     "Claim",
     "Closing",
     "Evidence",
@@ -24,15 +27,26 @@ __all__ = [
     "Judged",
     "Measured",
     "ObjectiveRecord",
+    "Opening",
     "PolicyRecord",
+    "PolicyRows",
     "StateRecord",
     "Step",
     "Tally",
     "Trade",
     "Unfolded",
+    "WorldRecord",
 ]
 
 VERSION = "1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Alternative:
+    """Another action of a state, and where it most likely leads: the state itself where staying is likeliest."""
+
+    action: str
+    towards: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +72,10 @@ class Step:
         all levels before; None where fewer than two are, where that is open, or where it was not asked.
     trades : tuple of Trade
         Where further objectives were given: one for the foil, or for each other action of the state.
+    told : bool
+        False where it matters and yet no sentence tells it, as there are to be few.
+    alternatives : tuple of Alternative
+        What else could have been done: the foil, or for a told step that is critical each other action.
     """
 
     state: int
@@ -71,6 +89,8 @@ class Step:
     foil: str | None = None
     further_spreads: tuple[tuple[Interval, Interval] | None, ...] = ()
     trades: tuple[Trade, ...] = ()
+    told: bool = True
+    alternatives: tuple[Alternative, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,6 +174,15 @@ class Unfolded:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Opening:
+    """A closed cell of the map that would have to open: where it lies (column, row), how it is called, what kind of ground it is."""
+
+    place: tuple[int, int]
+    name: str
+    kind: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class PolicyRecord:
     """The policy explained, the optimum or a given one, with its choices where the explanation can lead.
 
@@ -163,7 +192,18 @@ class PolicyRecord:
     """
 
     given: bool
-    choices: tuple[tuple[int, int, float], ...] = ()
+    choices: PolicyRows | Sequence[tuple[int, int, float]] = ()
+
+    def __post_init__(self) -> None:
+        """Keep the choices as columns."""
+        if not isinstance(self.choices, PolicyRows):
+            object.__setattr__(self, "choices", PolicyRows.of(self.choices))
+
+    @property
+    def rows(self) -> PolicyRows:
+        """The choices as columns."""
+        assert isinstance(self.choices, PolicyRows)
+        return self.choices
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,6 +236,9 @@ class Explanation:
         Whether it ends there for sure.
     in_the_way : tuple of int
         For "no way": hazards that block it.
+    openings : tuple of Opening
+        For "no way" on a map, where no hazard blocks it: a smallest set of closed cells that would have to open, in the order
+        of the way.
     steps : tuple of Step
     closing : Closing
     states : mapping of int to StateRecord
@@ -214,6 +257,8 @@ class Explanation:
         For a route with `also`: what the whole plan comes to at the start, under each level and each further objective.
     unfolded : Unfolded, optional
         Where the model is the product of another with what must be remembered.
+    world : WorldRecord, optional
+        The map that the states lie on.
     """
 
     source: str
@@ -229,6 +274,7 @@ class Explanation:
     circle_size: int = 0
     circle_certain: bool = True
     in_the_way: tuple[int, ...] = ()
+    openings: tuple[Opening, ...] = ()
     steps: tuple[Step, ...] = ()
     closing: Closing = field(default_factory=Closing)
     states: Mapping[int, StateRecord] = field(default_factory=dict)
@@ -240,6 +286,7 @@ class Explanation:
     also: tuple[Further, ...] = ()
     totals: tuple[Interval, ...] = ()
     unfolded: Unfolded | None = None
+    world: WorldRecord | None = None
 
     def __post_init__(self) -> None:
         """Let an objective without levels be its own only one."""

@@ -1,4 +1,7 @@
-"""A Solution and a question enter; the numbers that claims rest on leave: factors per level, computed on first use."""
+"""A Solution and a question enter; the numbers that claims rest on leave: factors per level, computed on first use.
+
+What does not depend on the state asked about is kept for the next question (`ratherthan.explain.shared`).
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,23 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+import numpy.typing as npt
+
 from ratherthan.explain.question import Question
+from ratherthan.explain.shared import kept
 from ratherthan.factors import (
     Compared,
     Constrictiveness,
+    Counts,
     Criticality,
+    Effort,
     Interval,
+    Nearer,
     Responsibility,
     compared_at,
     constrictiveness,
+    count_decisions,
     critical_states,
     critical_states_of_levels,
     nearer_goal,
@@ -42,9 +53,15 @@ class Factors:
     @cached_property
     def levels(self) -> tuple[Responsibility, ...]:
         """The same for every level of the objective, ``[K]``."""
-        return tuple(
-            responsibility(self.solution, objective=k, policy_values=self.asked.policy_values)
-            for k in range(len(self.solution.objectives))
+        return tuple(self._level(k) for k in range(len(self.solution.objectives)))
+
+    def _level(self, k: int) -> Responsibility:
+        """Return the numbers of one level."""
+        solution, of_policy = self.solution, self.asked.policy_values
+        return kept(
+            solution,
+            ("measures", k, of_policy),
+            lambda: responsibility(solution, objective=k, policy_values=of_policy),
         )
 
     @cached_property
@@ -60,6 +77,15 @@ class Factors:
     @cached_property
     def critical(self) -> Criticality:
         """The critical states."""
+        return kept(self.solution, ("critical", *self._standard), self._critical)
+
+    @property
+    def _standard(self) -> tuple[float, bool, float, bool]:
+        """By what it is judged whether a state is critical."""
+        return self.asked.alpha, self.asked.omega, self.asked.tolerance, self.asked.policy_values
+
+    def _critical(self) -> Criticality:
+        """Return the critical states."""
         asked = self.asked
         if len(self.solution.objectives) > 1:
             return critical_states_of_levels(
@@ -77,7 +103,7 @@ class Factors:
     @cached_property
     def _counted(self) -> dict[int, Constrictiveness]:
         """What was counted so far."""
-        return {}
+        return kept(self.solution, ("counts", *self._standard, self.asked.search), dict[int, Constrictiveness])
 
     def counts(self, choices: Iterable[int]) -> dict[int, Constrictiveness]:
         """Return how many decisions each of `choices` leaves open. Asked for together they are found much faster."""
@@ -87,22 +113,40 @@ class Factors:
             self._counted.update(self._count(missing))
         return {choice: self._counted[choice] for choice in wanted}
 
+    def counted(self, choices: npt.NDArray[np.int64], effort: Effort) -> Counts:
+        """Return how many decisions each of many choices leaves open, with no more work than is granted."""
+        solution = self.solution
+        return count_decisions(
+            solution.problem.mdp,
+            self.critical,
+            solution.ended,
+            choices,
+            search=self.asked.search,
+            nearer=self._nearer(),
+            effort=effort,
+        )
+
     def _count(self, choices: Iterable[int]) -> dict[int, Constrictiveness]:
         """Return how many decisions each of `choices` leaves open."""
-        solution = self.solution
-        if self.asked.policy_values:
-            lower, upper = solution.policy_lower[0], solution.policy_upper[0]
-        else:
-            lower, upper = solution.lower[0], solution.upper[0]
-        toward = nearer_goal(lower, upper, maximise=solution.objectives[0].maximise, tolerance=self.asked.tolerance)
         return constrictiveness(
             self.solution.problem.mdp,
             self.critical,
             self.solution.ended,
             choices,
             search=self.asked.search,
-            nearer=toward if self.asked.search.toward_goal else None,
+            nearer=self._nearer(),
         )
+
+    def _nearer(self) -> tuple[Nearer, Nearer] | None:
+        """Return which branches lead to better values, where only these are followed."""
+        solution = self.solution
+        if not self.asked.search.toward_goal:
+            return None
+        if self.asked.policy_values:
+            lower, upper = solution.policy_lower[0], solution.policy_upper[0]
+        else:
+            lower, upper = solution.lower[0], solution.upper[0]
+        return nearer_goal(lower, upper, maximise=solution.objectives[0].maximise, tolerance=self.asked.tolerance)
 
     def further_spreads(self, state: int) -> tuple[tuple[Interval, Interval] | None, ...]:
         """Return λmax and λmin for each level after the first, among the choices that are compared there."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 from ratherthan.errors import ExplanationError
 from ratherthan.explain.explanation import (
     VERSION,
+    Alternative,
     Claim,
     Closing,
     Evidence,
@@ -16,13 +18,17 @@ from ratherthan.explain.explanation import (
     Judged,
     Measured,
     ObjectiveRecord,
+    Opening,
     PolicyRecord,
+    PolicyRows,
     StateRecord,
     Step,
     Tally,
     Trade,
     Unfolded,
 )
+from ratherthan.explain.form import Test, test_of
+from ratherthan.explain.places import world_from_json
 from ratherthan.explain.question import Question
 from ratherthan.factors import Interval, Search
 from ratherthan.model.lexicon import Lexicon
@@ -38,7 +44,7 @@ def from_document(document: Mapping[str, Any]) -> tuple[Explanation, str]:
     ExplanationError
         If it is of another version, or does not have the form of the schema.
     """
-    _check_form(document)
+    rows = _check_form(document)
     search = Search(horizon=document["search"]["horizon"], toward_goal=document["search"]["toward_goal"])
     asked = Question(
         kind=document["kind"],
@@ -76,6 +82,10 @@ def from_document(document: Mapping[str, Any]) -> tuple[Explanation, str]:
         circle_size=document["circle_size"],
         circle_certain=document["circle_certain"],
         in_the_way=tuple(document["in_the_way"]),
+        openings=tuple(
+            Opening(place=(cell["place"][0], cell["place"][1]), name=cell["name"], kind=cell["kind"])
+            for cell in document.get("openings", ())
+        ),
         steps=tuple(_as_step(step) for step in document["steps"]),
         closing=Closing(
             printed=document["closing"]["printed"],
@@ -85,25 +95,58 @@ def from_document(document: Mapping[str, Any]) -> tuple[Explanation, str]:
         ),
         states={int(state): _as_state(record) for state, record in document["states"].items()},
         size=(size["states"], size["choices"], size["branches"]),
-        policy=PolicyRecord(
-            given=document["policy"]["given"],
-            choices=tuple((s, c, float(p)) for s, c, p in document["policy"]["choices"]),
-        ),
+        policy=PolicyRecord(given=document["policy"]["given"], choices=rows),
         lexicon=Lexicon(**document["lexicon"]),
         outcome=document["outcome"],
+        world=world_from_json(document["world"]) if "world" in document else None,
     )
     return explanation, document["text"]
 
 
-def _check_form(document: Mapping[str, Any]) -> None:
-    from jsonschema import Draft202012Validator
-
-    from ratherthan.explain.schema import schema
-
+def _check_form(document: Mapping[str, Any]) -> PolicyRows:
+    """Raise where a document has not the form of the schema; return its policy, which is checked as columns."""
     version = document.get("version") if isinstance(document, Mapping) else None
     if version != VERSION:
         came = "no version" if version is None else f"version {version!r}"
         raise ExplanationError(f"An explanation must be a JSON document of version '{VERSION}', got {came}.")
+    policy = document.get("policy")
+    listed = policy.get("choices") if isinstance(policy, Mapping) else None
+    rows = _rows(listed)
+    if rows is not None and isinstance(policy, Mapping):  # then its rows are in order, and need not be looked at again
+        document = {**document, "policy": {**policy, "choices": []}}
+    if not _test()(document):
+        _refuse_form(document)
+    if rows is None:
+        odd = next(number for row in listed or () for number in row[:2] if type(number) is not int)
+        raise ExplanationError(f"A state, choice or count must be a whole number at policy, got {odd!r}.")
+    return rows
+
+
+def _rows(listed: object) -> PolicyRows | None:
+    """Return the rows of a policy; None where some are no [whole number, whole number, number]."""
+    if not isinstance(listed, list) or not set(map(type, listed)) <= {list} or not set(map(len, listed)) <= {3}:
+        return None
+    try:
+        return PolicyRows.of(listed)
+    except TypeError:
+        return None
+    except OverflowError:
+        raise ExplanationError("A state, choice or count must be a number of at most 64 bits at policy.") from None
+
+
+@cache
+def _test() -> Test:
+    from ratherthan.explain.schema import schema
+
+    return test_of(schema())
+
+
+def _refuse_form(document: Mapping[str, Any]) -> None:
+    """Raise with the first place where a document has not the form of the schema."""
+    from jsonschema import Draft202012Validator
+
+    from ratherthan.explain.schema import schema
+
     faults = sorted(Draft202012Validator(schema()).iter_errors(document), key=lambda fault: list(map(str, fault.path)))
     if faults:
         where = ".".join(map(str, faults[0].absolute_path)) or "the document"
@@ -183,6 +226,8 @@ def _as_step(step: Mapping[str, Any]) -> Step:
             for claim in step["claims"]
         ),
         trades=tuple(_as_trade(trade) for trade in step["trades"]),
+        told=step.get("told", True),
+        alternatives=tuple(Alternative(**other) for other in step.get("alternatives", ())),
     )
 
 

@@ -23,12 +23,13 @@ from ratherthan.explain.explanation import (
     Step,
     Tally,
 )
+from ratherthan.explain.places import world_to_json
 from ratherthan.explain.question import FACTORS
 from ratherthan.explain.reading import from_document
 from ratherthan.factors import Interval
 from ratherthan.model.lexicon import Lexicon
 
-__all__ = ["digest", "from_document", "number", "to_document"]
+__all__ = ["digest", "digest_of", "frame_of", "from_document", "number", "to_document"]
 
 Document = dict[str, Any]
 
@@ -47,8 +48,16 @@ def to_document(explanation: Explanation, text: str) -> Document:
     dict
         Only dicts, lists, strings, numbers, booleans and None; ``docs/schema/explanation.schema.json`` describes it.
     """
+    document = frame_of(explanation, text)
+    document["policy"]["choices"] = list(map(list, explanation.policy.rows))
+    document["digest"] = digest_of(explanation, document)
+    return document
+
+
+def frame_of(explanation: Explanation, text: str) -> Document:
+    """Return the document of an explanation without the choices of its policy, which may be a million, and without its digest."""
     asked = explanation.question
-    document: Document = {
+    return {
         "version": VERSION,
         "source": explanation.source,
         "property": explanation.property,
@@ -93,20 +102,47 @@ def to_document(explanation: Explanation, text: str) -> Document:
         "unfolded": None if explanation.unfolded is None else asdict(explanation.unfolded),
         "policy": {
             "given": explanation.policy.given,
-            "choices": [[state, choice, share] for state, choice, share in explanation.policy.choices],
+            "choices": [],
         },
         "lexicon": _lexicon(explanation.lexicon),
         "outcome": explanation.outcome,
+        **_openings(explanation),
+        **({} if explanation.world is None else {"world": world_to_json(explanation.world)}),
     }
-    document["digest"] = digest(document)
-    return document
+
+
+def _openings(explanation: Explanation) -> dict[str, Any]:
+    """Return the closed cells that would have to open; nothing where there are none."""
+    listed = [{"place": list(cell.place), "name": cell.name, "kind": cell.kind} for cell in explanation.openings]
+    return {"openings": listed} if listed else {}
 
 
 def digest(document: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a document without its digest, in one canonical spelling."""
+    return _hashed(_canonical(document))
+
+
+def digest_of(explanation: Explanation, document: Mapping[str, Any]) -> str:
+    """Return the same of the document of an explanation, whatever stands there in the place of the policy's choices."""
     rest = {key: value for key, value in document.items() if key != "digest"}
-    spelled = json.dumps(rest, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
-    return "sha256:" + hashlib.sha256(spelled.encode()).hexdigest()
+    head, own, tail = _canonical(rest | {"policy": document["policy"] | {"choices": []}}).partition(_NO_CHOICES)
+    return _hashed(head, own[:-2], explanation.policy.rows.spelled(), tail)
+
+
+_NO_CHOICES = '"policy":{"choices":[]'
+"""It stands once in the canonical spelling: quotation marks within a text are escaped."""
+
+
+def _canonical(document: Mapping[str, Any]) -> str:
+    rest = {key: value for key, value in document.items() if key != "digest"}
+    return json.dumps(rest, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+
+
+def _hashed(*parts: str) -> str:
+    found = hashlib.sha256()
+    for part in parts:
+        found.update(part.encode())
+    return "sha256:" + found.hexdigest()
 
 
 def number(value: float | None) -> float | int | str | None:
@@ -157,6 +193,8 @@ def _step(step: Step, states: Mapping[int, StateRecord]) -> Document:
             {"claim": trade.claim, "against": list(trade.against), "judged": [_judged(one) for one in trade.judged]}
             for trade in step.trades
         ],
+        **({} if step.told else {"told": False}),
+        **({"alternatives": [asdict(other) for other in step.alternatives]} if step.alternatives else {}),
     }
 
 

@@ -22,7 +22,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from ratherthan.explain._kernels import Rows, shortest_to, spread
 from ratherthan.explain.objectives import endless
+from ratherthan.model._kernels import compiled, is_compiled, sorted_by
+from ratherthan.model.index import branches_of, index_of
 from ratherthan.model.mdp import Bools, Floats
 from ratherthan.solve.solution import Solution
 
@@ -30,7 +33,8 @@ __all__ = ["PolicyGraph", "Route", "policy_graph", "reachable_at_all", "route_fr
 
 TIE = 1e-12
 MOST_STEPS = 1000
-SMALL = 20_000
+SMALL, MANY = 20_000, 20_000
+"""Up to how many edges shortest ways are found in plain Python, and from how many on it is worth compiling the search."""
 
 Array = npt.NDArray[np.int64]
 
@@ -77,10 +81,48 @@ class PolicyGraph:
         """The state of each edge, ``[E]``."""
         return np.repeat(np.arange(self.states), np.diff(self.first))
 
-    def reachable(self, start: int) -> Bools:
-        """Return which states can be reached from `start`, itself included."""
-        seen = np.zeros(self.states, dtype=bool)
+    @cached_property
+    def length(self) -> Floats:
+        """-log of the probability of each edge, ``[E]``."""
+        return np.asarray(-np.log(np.minimum(self.probability, 1.0)))
+
+    @cached_property
+    def _known(self) -> list[tuple[Bools, Floats]]:
+        """Sets of states, and the shortest ways to them."""
+        return []
+
+    def distances(self, goals: Bools) -> Floats:
+        """Return the least total length from each state to one of `goals`, ``[S]``; kept for the next question.
+
+        Parameters
+        ----------
+        goals : array of bool, ``[S]``
+            Not to be changed afterwards.
+        """
+        for known, distance in self._known:
+            if known is goals:
+                return distance
+        self._known[:] = [(goals, _distances(self, goals))]
+        return self._known[0][1]
+
+    def reachable(self, start: int, seen: Bools | None = None) -> Bools:
+        """Return which states can be reached from `start`, itself included.
+
+        Parameters
+        ----------
+        start : int
+        seen : array of bool, ``[S]``, optional
+            States that are known to be reached, with all that they lead to; they are marked in what is returned, too.
+        """
+        seen = np.zeros(self.states, dtype=bool) if seen is None else seen.copy()
+        if seen[start]:
+            return seen
         seen[start] = True
+        if is_compiled(len(self.target)):
+            queue = np.empty(self.states, dtype=np.int64)
+            queue[0] = start
+            compiled(spread, len(self.target))(self.first, self.target, seen, queue, 1)
+            return seen
         frontier = np.array([start])
         while len(frontier):
             counts = self.first[frontier + 1] - self.first[frontier]
@@ -93,23 +135,25 @@ class PolicyGraph:
 
 def policy_graph(solution: Solution) -> PolicyGraph:
     """Return the graph that the solution's policy follows."""
-    mdp = solution.problem.mdp
-    taken = solution.policy.weights(mdp)
-    state_of_choice = np.repeat(np.arange(mdp.states), np.diff(mdp.state_to_choices))
-    taken = np.where(solution.ended[state_of_choice], 0.0, taken)
-    chosen = np.flatnonzero(taken > 0)
-    begin = mdp.choice_to_branches[chosen].astype(np.int64)
-    counts = mdp.choice_to_branches[chosen + 1] - begin
-    total = int(counts.sum())
-    skip = np.repeat(begin - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts) if total else np.zeros(0, np.int64)
-    branch = skip + np.arange(total)
-    choice = np.repeat(chosen, counts)
-    origin, target = state_of_choice[choice], mdp.branch_to_target[branch].astype(np.int64)
-    moves = origin != target
-    origin, target, choice = origin[moves], target[moves], choice[moves]
-    weight = taken[choice] * mdp.branch_to_probability[branch[moves]]
+    mdp, policy = solution.problem.mdp, solution.policy
+    if policy.chance is None:
+        own = np.flatnonzero((policy.choice >= 0) & ~solution.ended)
+        chosen = policy.choice[own].astype(np.int64)
+    else:
+        state_of_choice = index_of(mdp).choice_to_state
+        chosen = np.flatnonzero((policy.chance > 0) & ~solution.ended[state_of_choice])
+        own = state_of_choice[chosen].astype(np.int64)
+    branch, rows = branches_of(mdp.choice_to_branches, chosen)
+    counts = np.diff(rows)
+    origin, target = np.repeat(own, counts), mdp.branch_to_target[branch].astype(np.int64)
+    weight = mdp.branch_to_probability[branch]
+    if policy.chance is not None:
+        weight = np.repeat(policy.chance[chosen], counts) * weight
+    moves = np.flatnonzero(origin != target)
+    origin, target, weight = origin[moves], target[moves], weight[moves]
     sums = np.bincount(origin, weights=weight, minlength=mdp.states)
     first = np.concatenate([[0], np.cumsum(np.bincount(origin, minlength=mdp.states))])
+    choice = np.repeat(chosen, counts)[moves]
     return PolicyGraph(first=first, target=target, choice=choice, probability=weight / sums[origin])
 
 
@@ -136,7 +180,7 @@ def route_from(solution: Solution, graph: PolicyGraph, start: int) -> Route:
         return Route(states=(start,), choices=(), outcome="no way", probability=1.0, circle=tuple(map(int, reached)))
     reachable = graph.reachable(start)
     if (reachable & solution.goal).any():
-        states, choices, probability = _most_probable(graph, start, solution.goal, reachable)
+        states, choices, probability = _most_probable(graph, start, solution.goal)
         return Route(states=states, choices=choices, outcome="arrives", probability=probability)
     return _circling(solution, graph, start, reachable)
 
@@ -195,7 +239,7 @@ def _stay(solution: Solution, state: int) -> tuple[int, ...]:
 def _circling(solution: Solution, graph: PolicyGraph, start: int, reachable: Bools) -> Route:
     """Return the most probable way into a set of states that the policy cannot leave, once round it, and that set."""
     component, closed = _closed_components(graph, reachable)
-    states, choices, probability = _most_probable(graph, start, closed, reachable)
+    states, choices, probability = _most_probable(graph, start, closed)
     circle = np.flatnonzero(component == component[states[-1]])
     round_states, round_choices = _once_round(solution, graph, states[-1])
     return Route(
@@ -239,12 +283,9 @@ def _once_round(solution: Solution, graph: PolicyGraph, start: int) -> tuple[tup
     return tuple(states), tuple(choices)
 
 
-def _most_probable(
-    graph: PolicyGraph, start: int, goals: Bools, reachable: Bools
-) -> tuple[tuple[int, ...], tuple[int, ...], float]:
+def _most_probable(graph: PolicyGraph, start: int, goals: Bools) -> tuple[tuple[int, ...], tuple[int, ...], float]:
     """Return states, choices and probability of the most probable path from `start` to one of `goals`."""
-    length = -np.log(np.minimum(graph.probability, 1.0))
-    distance = _distances(graph, length, goals, reachable)
+    length, distance = graph.length, graph.distances(goals)
     states, choices, total = [start], [], 0.0
     while not goals[states[-1]]:
         edge = _next_edge(graph, length, distance, states)
@@ -264,20 +305,26 @@ def _next_edge(graph: PolicyGraph, length: Floats, distance: Floats, states: lis
     total = {e: float(length[e] + distance[graph.target[e]]) for e in edges}
     keeping = [e for e in edges if total[e] <= distance[here] + TIE]
     nearer = (e for e in keeping if distance[graph.target[e]] < distance[here] or len(edges) == 1)
+    for edge in nearer:
+        return edge
     visited = set(states)
     fresh = [e for e in edges if int(graph.target[e]) not in visited]
-    return next(nearer, next((e for e in keeping if e in fresh), min(fresh or edges, key=total.__getitem__)))
+    return next((e for e in keeping if e in fresh), min(fresh or edges, key=total.__getitem__))
 
 
-def _distances(graph: PolicyGraph, length: Floats, goals: Bools, reachable: Bools) -> Floats:
-    """Return the least total length from each reachable state to one of `goals`, ``[S]``."""
-    inside = np.flatnonzero(reachable[graph.origin] & ~goals[graph.origin])
-    order = inside[np.argsort(graph.target[inside], kind="stable")]
-    into = np.searchsorted(graph.target[order], np.arange(graph.states + 1))
+def _distances(graph: PolicyGraph, goals: Bools) -> Floats:
+    """Return the least total length from each state to one of `goals`, ``[S]``."""
+    if len(graph.target) > MANY and is_compiled(len(graph.target)):
+        count = len(graph.target)
+        first, edge = compiled(sorted_by, count)(graph.target, np.arange(count), graph.states)
+        return compiled(shortest_to, count)(graph.origin, graph.length, Rows(first, edge.astype(np.int64)), goals)
+    inside = np.flatnonzero(~goals[graph.origin])
     if len(inside) > SMALL:
-        return _distances_compiled(graph, length, goals & reachable, inside)
+        return _distances_by_library(graph, goals, inside)
+    order = inside[np.argsort(graph.target[inside], kind="stable")]
+    into_state = np.searchsorted(graph.target[order], np.arange(graph.states + 1))
     distance = np.full(graph.states, np.inf)
-    sources = np.flatnonzero(goals & reachable)
+    sources = np.flatnonzero(goals)
     distance[sources] = 0.0
     queue = [(0.0, int(s)) for s in sources]
     done = np.zeros(graph.states, dtype=bool)
@@ -286,16 +333,16 @@ def _distances(graph: PolicyGraph, length: Floats, goals: Bools, reachable: Bool
         if done[state]:
             continue
         done[state] = True
-        for edge in order[into[state] : into[state + 1]]:
-            origin, candidate = int(graph.origin[edge]), so_far + float(length[edge])
+        for edge in order[into_state[state] : into_state[state + 1]]:
+            origin, candidate = int(graph.origin[edge]), so_far + float(graph.length[edge])
             if candidate < distance[origin]:
                 distance[origin] = candidate
                 heapq.heappush(queue, (candidate, origin))
     return distance
 
 
-def _distances_compiled(graph: PolicyGraph, length: Floats, goals: Bools, inside: Array) -> Floats:
-    """Do the same with scipy's compiled algorithm, for large models.
+def _distances_by_library(graph: PolicyGraph, goals: Bools, inside: Array) -> Floats:
+    """Do the same with the algorithm that scipy has compiled: where nothing of ours may be.
 
     A length of exactly 0 would vanish from a sparse matrix, and of parallel edges the matrix keeps the sum: so lengths are
     taken up by the smallest number that cannot matter, and only the shortest of parallel edges is kept.
@@ -304,12 +351,11 @@ def _distances_compiled(graph: PolicyGraph, length: Floats, goals: Bools, inside
     from scipy.sparse.csgraph import dijkstra
 
     origin, target = graph.origin[inside], graph.target[inside]
-    lengths = np.maximum(length[inside], 1e-300)
+    lengths = np.maximum(graph.length[inside], 1e-300)
     order = np.lexsort((lengths, origin, target))
     origin, target, lengths = origin[order], target[order], lengths[order]
     keep = np.ones(len(order), dtype=bool)
     keep[1:] = (origin[1:] != origin[:-1]) | (target[1:] != target[:-1])
     backwards = csr_array((lengths[keep], (target[keep], origin[keep])), shape=(graph.states, graph.states))
-    sources = np.flatnonzero(goals)
-    distance: Floats = dijkstra(backwards, directed=True, indices=sources, min_only=True)
+    distance: Floats = dijkstra(backwards, directed=True, indices=np.flatnonzero(goals), min_only=True)
     return distance

@@ -54,6 +54,29 @@ def _or_null(what: dict[str, Any]) -> dict[str, Any]:
     return {"anyOf": [what, {"type": "null"}]}
 
 
+def _world() -> dict[str, Any]:
+    """Return the form of a map; its cells are deflated bytes in base 64."""
+    texts = {"type": "array", "items": _TEXT}
+    frame = {name: {"type": "number"} for name in ("resolution", "x", "y", "yaw")}
+    road = {"type": "array", "items": _COUNT, "minItems": 2, "maxItems": 2}
+    return _record(
+        {
+            "width": _COUNT,
+            "height": _COUNT,
+            "kinds": texts,
+            "ground": _TEXT,
+            "zones": {"type": "object", "additionalProperties": _TEXT},
+            "goals": _TEXT,
+            "hazards": _TEXT,
+            "roads": {"type": "array", "items": road},
+            "numbered": _FLAG,
+            "frame": _or_null(_record(frame)),
+            "title": _TEXT,
+            "note": _TEXT,
+        }
+    )
+
+
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of an explanation document."""
     bounds = {"lower": _NUMBER, "upper": _NUMBER}
@@ -93,7 +116,10 @@ def schema() -> dict[str, Any]:
             "foil": _or_null(_TEXT),
             "claims": {"type": "array", "items": claim},
             "trades": {"type": "array", "items": trade},
-        }
+            "told": _FLAG,
+            "alternatives": {"type": "array", "items": _record({"action": _TEXT, "towards": _COUNT})},
+        },
+        optional=("told", "alternatives"),
     )
     objective = _record(
         {
@@ -167,8 +193,15 @@ def schema() -> dict[str, Any]:
                 }
             ),
             "outcome": _TEXT,
+            "openings": {
+                "type": "array",
+                "items": _record({"place": place, "name": _TEXT, "kind": _TEXT}),
+                "minItems": 1,
+            },
+            "world": _world(),
             "digest": {"type": "string", "pattern": "^sha256:[0-9a-f]{64}$"},
-        }
+        },
+        optional=("openings", "world"),
     )
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -3,9 +3,12 @@
 from ratherthan.factors.compare import TOLERANCE, Comparison, Interval, compare
 from ratherthan.factors.constrictiveness import (
     Constrictiveness,
+    Counts,
+    Effort,
     Nearer,
     Search,
     constrictiveness,
+    count_decisions,
     nearer_goal,
     search_tree,
 )
@@ -18,7 +21,9 @@ __all__ = [
     "Compared",
     "Comparison",
     "Constrictiveness",
+    "Counts",
     "Criticality",
+    "Effort",
     "Interval",
     "Nearer",
     "Responsibility",
@@ -26,6 +31,7 @@ __all__ = [
     "compare",
     "compared_at",
     "constrictiveness",
+    "count_decisions",
     "critical_states",
     "critical_states_of_levels",
     "nearer_goal",

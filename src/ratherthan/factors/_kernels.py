@@ -94,23 +94,25 @@ def rooted_weights(
     certain: Counts,
     possible: Counts,
     trees: Trees,
+    room: tuple[Counts, Ints, int],
     budget: int,
-) -> tuple[Counts, Counts, int]:
+) -> tuple[Counts, Counts, int, int]:
     """Weigh the search tree of every one of `choices`, of the `states`, with what the trees know already.
 
     `rows` are choice_to_branches, branch_to_target, and the graph's leaving_from and leaving. A root that can be reached from
-    the choice without its state stands for all that it reaches without it; only the rest is searched. Returns the weights
-    and how many choices were weighed before `budget` visits were spent.
+    the choice without its state stands for all that it reaches without it; only the rest is searched. `room` is a mark per
+    state, a queue for all states and the stamp of the first choice. Returns the weights, how many choices were weighed before
+    `budget` visits were spent, and how many were.
     """
     choice_to_branches, branch_to_target, leaving_from, leaving = rows
-    count = len(leaving_from) - 1
-    mark, queue = np.full(count, -1, np.int32), np.zeros(count, np.int32)
+    mark, queue, stamp = room
     lower, upper = np.zeros(len(choices), np.int64), np.zeros(len(choices), np.int64)
     spent = 0
     for i in range(len(choices)):
         if spent > budget:
-            return lower, upper, i
+            return lower, upper, i, spent
         s = states[i]
+        now = stamp + i
         begin, end = choice_to_branches[choices[i]], choice_to_branches[choices[i] + 1]
         known, most = -1, -1
         for k in range(len(trees.roots)):
@@ -138,12 +140,12 @@ def rooted_weights(
                 first, last = p, p + trees.size[known, s]
                 lower[i] -= trees.certain[known, last] - trees.certain[known, first]
         filled, head = 0, 0
-        mark[s] = i
+        mark[s] = now
         for b in range(begin, end):
             t = branch_to_target[b]
             q = trees.position[known, t] if known >= 0 else -1
-            if mark[t] != i and (q < 0 or first <= q < last):
-                mark[t] = i
+            if mark[t] != now and (q < 0 or first <= q < last):
+                mark[t] = now
                 queue[filled] = t
                 filled += 1
         while head < filled:
@@ -153,11 +155,11 @@ def rooted_weights(
             upper[i] += possible[u]
             for e in range(leaving_from[u], leaving_from[u + 1]):
                 t = leaving[e]
-                if mark[t] != i:
+                if mark[t] != now:
                     q = trees.position[known, t] if known >= 0 else -1
                     if q < 0 or first <= q < last:
-                        mark[t] = i
+                        mark[t] = now
                         queue[filled] = t
                         filled += 1
         spent += filled + 1
-    return lower, upper, len(choices)
+    return lower, upper, len(choices), spent

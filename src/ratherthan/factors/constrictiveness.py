@@ -11,32 +11,51 @@ states reachable from the successors of (s,a) in the graph without s, each count
 Where criticality is open the count has two bounds: open states counted, and not counted.
 
 Method: one breadth-first search per choice; a choice costs one pass over the branches it reaches. Where many choices are asked
-about on a large model, what their searches share is counted once (`landmarks`); the counts are the same.
+about on a large model, what their searches share is counted once (`counting`); the counts are the same. To count all of them
+is in the worst case as hard as to say which states reach which, for which nothing much better than one search each is known:
+whoever does not want to wait for it grants an `Effort`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
 from ratherthan.factors._kernels import tree_weight
 from ratherthan.factors.compare import TOLERANCE
-from ratherthan.factors.landmarks import landmarks_of, tree_weights
+from ratherthan.factors.counting.effort import Counts, Effort
+from ratherthan.factors.counting.ground import Ground, ground_of, known_ground, restricted
+from ratherthan.factors.counting.plan import count_all, count_near
 from ratherthan.factors.selectiveness import Criticality
 from ratherthan.model._kernels import compiled
-from ratherthan.model.index import index_of
 from ratherthan.model.mdp import MDP, Bools, Floats
+from ratherthan.model.watch import look
 
-__all__ = ["Constrictiveness", "Nearer", "Search", "constrictiveness", "nearer_goal", "search_tree"]
+__all__ = [
+    "Constrictiveness",
+    "Counts",
+    "Effort",
+    "Nearer",
+    "Search",
+    "constrictiveness",
+    "count_decisions",
+    "nearer_goal",
+    "search_tree",
+]
 
 States = npt.NDArray[np.int64]
 
-FEW, LITTLE = 40, 1_000_000
-"""Up to how many choices, and up to how many of them times branches, each choice is searched by itself."""
+FEW, LITTLE = 4, 1_000_000
+"""Up to how many choices, and up to how many of them times branches, each choice is searched by itself: in all questions together."""
+_SEARCHED: WeakKeyDictionary[MDP, int] = WeakKeyDictionary()
+
+ALL = Effort()
+"""Count everything, however long it takes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,17 +147,82 @@ def constrictiveness(
     -------
     dict of int to Constrictiveness
     """
+    found = count_decisions(mdp, critical, ended, np.fromiter(choices, dtype=np.int64), search=search, nearer=nearer)
+    rows = zip(found.choices.tolist(), found.lower.tolist(), found.upper.tolist(), strict=True)
+    return {choice: Constrictiveness(lower=lower, upper=upper) for choice, lower, upper in rows}
+
+
+def count_decisions(
+    mdp: MDP,
+    critical: Criticality,
+    ended: Bools,
+    choices: States,
+    *,
+    search: Search = Search(),
+    nearer: tuple[Nearer, Nearer] | None = None,
+    effort: Effort = ALL,
+) -> Counts:
+    """Count the decisions that each of many choices leaves open, with no more work than is granted.
+
+    Parameters
+    ----------
+    mdp : MDP
+    critical : Criticality
+    ended : array of bool, ``[S]``
+    choices : array of int, ``[N]``
+    search : Search
+    nearer : pair of Nearer, optional
+        As in `constrictiveness`.
+    effort : Effort
+        Everything is counted by default, however long it takes.
+
+    Returns
+    -------
+    Counts
+
+    Raises
+    ------
+    LimitError
+        If a limit of time or memory is reached.
+    """
     weight = np.diff(mdp.state_to_choices).astype(np.int64)
-    certain, possible = weight * critical.certain, weight * critical.possible
-    asked = np.fromiter(choices, dtype=np.int64)
-    if search == Search() and len(asked) > FEW and len(asked) * mdp.branches > LITTLE:
-        known = landmarks_of(mdp, ended, asked)
-        lower, upper = tree_weights(index_of(mdp), known, asked, (certain, possible))
-        return {
-            int(choice): Constrictiveness(lower=int(low), upper=int(high))
-            for choice, low, high in zip(asked, lower, upper, strict=True)
-        }
-    return _searched(mdp, ended, asked, (certain, possible), search=search, nearer=nearer)
+    certain = weight * critical.certain
+    possible = certain if np.array_equal(critical.certain, critical.possible) else weight * critical.possible
+    weights = certain, possible
+    steered = nearer if search.toward_goal and nearer is not None else None
+    asked = len(choices) + (_SEARCHED.get(mdp, 0) if steered is None else 0)
+    many = asked > FEW and asked * mdp.branches > LITTLE
+    known = steered is None and known_ground(mdp, ended) is not None
+    if not (many or known or effort != ALL):
+        if steered is None:
+            _SEARCHED[mdp] = asked
+        return _searched(mdp, ended, choices, weights, horizon=search.horizon, steered=steered)
+    if steered is None:
+        return _counted(ground_of(mdp, ended), choices, weights, search, effort)
+    sure, maybe = (restricted(mdp, ended, *follow) for follow in steered)
+    if certain is possible and sure.same_edges(maybe):
+        return _counted(sure, choices, weights, search, effort)
+    half = effort if effort.visits is None else replace(effort, visits=effort.visits // 2)
+    least = _counted(sure, choices, (certain, certain), search, half)
+    rest = effort if effort.visits is None else replace(effort, visits=max(effort.visits - least.visits, 0))
+    most = _counted(maybe, choices, (possible, possible), search, rest)
+    counted = least.counted & most.counted
+    return Counts(
+        choices=choices,
+        lower=least.lower,
+        upper=most.upper,
+        counted=counted,
+        visits=least.visits + most.visits,
+        estimate=np.where(least.counted, least.lower, least.estimate),
+        error=least.error,
+        estimated=(least.estimated | least.counted) & ~counted & effort.estimate,
+    )
+
+
+def _counted(ground: Ground, choices: States, weights: tuple[States, States], search: Search, effort: Effort) -> Counts:
+    if search.horizon is None:
+        return count_all(ground, choices, weights, effort)
+    return count_near(ground, choices, weights, effort, search.horizon)
 
 
 def _searched(
@@ -147,41 +231,38 @@ def _searched(
     choices: States,
     weights: tuple[States, States],
     *,
-    search: Search,
-    nearer: tuple[Nearer, Nearer] | None,
-) -> dict[int, Constrictiveness]:
+    horizon: int | None,
+    steered: tuple[Nearer, Nearer] | None,
+) -> Counts:
     """Count by one search per choice."""
-    certain, possible = weights
     rows = mdp.state_to_choices, mdp.choice_to_branches, mdp.branch_to_target
     mark, queue = np.zeros(mdp.states, dtype=np.int64), np.zeros(mdp.states, dtype=np.int64)
-    horizon = -1 if search.horizon is None else search.horizon
     everywhere = Nearer(np.zeros(0), np.zeros(0))
-    sure, maybe = nearer if search.toward_goal and nearer is not None else (everywhere, everywhere)
+    sure, maybe = steered or (everywhere, everywhere)
     kernel = compiled(tree_weight, mdp.branches)
-    counts = {}
+    lower, upper = np.zeros(len(choices), dtype=np.int64), np.zeros(len(choices), dtype=np.int64)
+    steps = -1 if horizon is None else horizon
     stamp = 0
-    for choice in map(int, choices):
-        branches = mdp.branches_of(choice)
-        own, found = (branches.start, branches.stop), []
+    for i, choice in enumerate(map(int, choices)):
+        look()
+        branches, found = mdp.branches_of(choice), []
+        own = branches.start, branches.stop
         for follow in (sure,) if sure is maybe else (sure, maybe):
             stamp += 1
             room = mark, queue, stamp
-            found.append(
-                kernel(
-                    mdp.state_of(choice),
-                    own,
-                    rows,
-                    ended,
-                    certain,
-                    possible,
-                    room,
-                    horizon,
-                    follow.target,
-                    follow.origin,
-                )
-            )
-        counts[choice] = Constrictiveness(lower=int(found[0].certain), upper=int(found[-1].possible))
-    return counts
+            found.append(kernel(mdp.state_of(choice), own, rows, ended, *weights, room, steps, *follow))
+        lower[i], upper[i] = found[0].certain, found[-1].possible
+    nothing = np.zeros(len(choices))
+    return Counts(
+        choices=choices,
+        lower=lower,
+        upper=upper,
+        counted=np.ones(len(choices), dtype=np.bool_),
+        visits=0,
+        estimate=nothing,
+        error=nothing,
+        estimated=np.zeros(len(choices), dtype=np.bool_),
+    )
 
 
 def search_tree(

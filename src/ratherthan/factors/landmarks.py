@@ -5,9 +5,10 @@ looks at the whole graph each time, though most of what it finds is always the s
 Its dominator tree tells what r reaches without s: all that r reaches but the subtree of s. The same tree of the reverse graph
 tells which states reach r without s. So if a successor of (s,a) reaches r without s, all that r reaches without s belongs to
 the search tree, its weight is a difference of sums known beforehand, and only what lies outside of it is searched. It is
-exact for any landmarks; their choice matters for speed alone. Good ones lie on the route and in the largest strong component.
+exact for any landmarks; their choice matters for speed alone. Good ones lie in the largest strong component, near the
+questions. One is made first, others where the searches show that it was not enough.
 
-The two trees of a landmark cost about as much as five searches: below some dozens of choices the plain search is faster.
+The two trees of a landmark cost about as much as three searches.
 
 References
 ----------
@@ -16,136 +17,150 @@ See `ratherthan.model.dominators`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
 from ratherthan.factors._kernels import Trees, rooted_weights
-from ratherthan.model._kernels import compiled, strong_components
-from ratherthan.model.dominators import DominatorTree, Graph, dominator_tree, graph_of, opposite
-from ratherthan.model.index import Index, index_of
-from ratherthan.model.mdp import MDP, Bools
+from ratherthan.factors.counting.ground import Ground
+from ratherthan.model._kernels import compiled, is_compiled
+from ratherthan.model.dominators import DominatorTree, dominator_tree, opposite
+from ratherthan.model.watch import look
 
-__all__ = ["Landmarks", "landmarks", "landmarks_of", "tree_weights"]
+__all__ = ["LANDMARKS", "Landmark", "Weigher", "landmark_at", "next_root", "slice_visits"]
 
 Numbers = npt.NDArray[np.int64]
 
 LANDMARKS = 3
+LEAST_SHARE = 0.01
+"""A strong component with a smaller share of the states gets no landmark: searches in it are short."""
 BUDGET = 4_000_000
-"""How many visits of a state are made between two chances to be interrupted: less than a second."""
+"""How many visits of a state are made between two looks, compiled: less than half a second, mostly."""
+USUAL = 4
+"""With so many edges a state; with more, fewer states are visited."""
+PLAIN = 40
+"""How many times slower the plain loops are."""
+CHUNK = 1 << 19
+"""How many choices a kernel is given at most at once."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Landmarks:
-    """A graph with the dominator trees of some of its states, forward and backward."""
+class Landmark:
+    """The dominator trees of one state, in the graph and in the reverse graph."""
 
-    graph: Graph
-    forward: tuple[DominatorTree, ...]
-    backward: tuple[DominatorTree, ...]
-
-    def weighed(self, certain: Numbers, possible: Numbers) -> Trees:
-        """Return the trees for the kernel, with prefix sums of two weights, ``[S]`` each."""
-        sums = [[_padded(tree.prefix(weight), len(weight)) for tree in self.forward] for weight in (certain, possible)]
-        return Trees(
-            roots=np.array([tree.root for tree in self.forward]),
-            position=np.array([tree.position for tree in self.forward]),
-            size=np.array([tree.size for tree in self.forward]),
-            certain=np.array(sums[0]),
-            possible=np.array(sums[1]),
-            back_position=np.array([tree.position for tree in self.backward]),
-            back_size=np.array([tree.size for tree in self.backward]),
-        )
+    forward: DominatorTree
+    backward: DominatorTree
 
 
-def _padded(sums: Numbers, states: int) -> Numbers:
-    return np.concatenate([sums, np.full(states + 1 - len(sums), sums[-1])])
+def landmark_at(ground: Ground, root: int) -> Landmark:
+    """Return the landmark at a state."""
+    graph = ground.graph
+    look()
+    forward = dominator_tree(graph, root)
+    look()
+    return Landmark(forward=forward, backward=dominator_tree(opposite(graph), root))
 
 
-def landmarks(index: Index, leaves: Bools, near: Numbers) -> Landmarks:
-    """Return a few landmarks of a graph.
+def next_root(ground: Ground, landmarks: Sequence[Landmark], states: Numbers) -> int | None:
+    """Return where one more landmark helps to answer questions at `states`, None where it would not.
 
-    Parameters
-    ----------
-    index : Index
-    leaves : array of bool, ``[S]``
-        States from which nothing is followed.
-    near : array of int
-        States around which questions will be asked, in the order of a route where there is one.
+    It lies in the largest strong component that has none yet, or once more in the largest: near the state in the middle of
+    those that are asked about, if possible at one that few questions are asked about, for it cannot help with its own.
     """
-    graph = graph_of(index, leaves)
-    largest = _largest_component(index, leaves)
-    candidates = [int(near[len(near) // 2]), int(near[0]), int(near[-1])] if len(near) else []
-    inside = [state for state in candidates if largest[state]]
-    members = np.flatnonzero(largest)
-    spread = [int(members[len(members) * k // LANDMARKS]) for k in range(LANDMARKS)]
-    roots = list(dict.fromkeys(inside + spread + candidates))[:LANDMARKS]
-    reverse = opposite(graph)
-    return Landmarks(
-        graph=graph,
-        forward=tuple(dominator_tree(graph, root) for root in roots),
-        backward=tuple(dominator_tree(reverse, root) for root in roots),
-    )
+    parts = ground.components
+    size = parts.size.copy()
+    enough = max(2.0, LEAST_SHARE * ground.states)
+    largest = int(size.argmax()) if len(size) else 0
+    for known in landmarks:
+        size[parts.component[known.forward.root]] = 0
+    chosen = int(size.argmax()) if len(size) and size.max() >= enough else largest
+    if not len(size) or parts.size[chosen] < enough:
+        return None
+    asked = np.bincount(states, minlength=ground.states)
+    inside = states[parts.component[states] == chosen]
+    members = parts.members[parts.members_from[chosen] : parts.members_from[chosen + 1]]
+    middle = int(inside[len(inside) // 2]) if len(inside) else int(members[len(members) // 2])
+    around = ground.leaving[ground.leaving_from[middle] : ground.leaving_from[middle + 1]]
+    near = np.array([middle, *around[parts.component[around] == chosen]], dtype=np.int64)
+    taken = {known.forward.root for known in landmarks}
+    free = [int(root) for root in near if int(root) not in taken]
+    return min(free, key=lambda root: asked[root]) if free else None
 
 
-_KNOWN: WeakKeyDictionary[MDP, tuple[Bools, Landmarks]] = WeakKeyDictionary()
+def slice_visits(ground: Ground) -> int:
+    """Return how many visits are made between two looks."""
+    few = BUDGET if is_compiled(ground.work) else BUDGET // PLAIN
+    return max(few * USUAL // max(USUAL, len(ground.leaving) // max(ground.states, 1)), 1)
 
 
-def landmarks_of(mdp: MDP, leaves: Bools, choices: Numbers) -> Landmarks:
-    """Return the landmarks of a model, found the first time they are asked for with these leaves, near these choices."""
-    before = _KNOWN.get(mdp)
-    if before is not None and np.array_equal(before[0], leaves):
-        return before[1]
-    index = index_of(mdp)
-    found = landmarks(index, leaves, index.choice_to_state[choices].astype(np.int64))
-    _KNOWN[mdp] = leaves.copy(), found
-    return found
-
-
-def _largest_component(index: Index, leaves: Bools) -> Bools:
-    """Return the states of the largest strong component, ``[S]``."""
-    component = np.full(index.states, -1, dtype=np.int64)
-    kernel = compiled(strong_components, index.work)
-    everywhere = np.ones(index.states, dtype=np.bool_)
-    allowed = ~leaves[index.choice_to_state]
-    kernel(
-        index.state_to_choices, index.choice_to_branches, index.branch_to_target,
-        allowed, np.arange(index.states), everywhere, component, 0,
-    )  # fmt: skip
-    largest: Bools = component == np.bincount(component).argmax()
-    return largest
-
-
-def tree_weights(
-    index: Index, known: Landmarks, choices: Numbers, weights: tuple[Numbers, Numbers], budget: int = BUDGET
-) -> tuple[Numbers, Numbers]:
-    """Return the weights of the search trees of some choices.
+class Weigher:
+    """Weighs the search trees of choices, with landmarks or without, in slices.
 
     Parameters
     ----------
-    index : Index
-    known : Landmarks
-        Of this index.
-    choices : array of int, ``[N]``
-    weights : pair of arrays of int, ``[S]`` each
+    ground : Ground
+    landmarks : sequence of Landmark
+        Of this ground.
+    weights : pair of arrays of int, ``[S]``
         Those of the states that count for sure, and of all that may count.
-    budget : int
-        How many states are visited, about, before the loop comes up for air: an interruption is heard then.
-
-    Returns
-    -------
-    lower, upper : array of int, ``[N]``
     """
-    certain, possible = weights
-    kernel = compiled(rooted_weights, index.work)
-    rows = index.choice_to_branches, index.branch_to_target, known.graph.leaving_from, known.graph.leaving
-    states, trees = index.choice_to_state[choices].astype(np.int64), known.weighed(certain, possible)
-    found: list[tuple[Numbers, Numbers]] = []
-    done = 0
-    while done < len(choices):
-        lower, upper, more = kernel(choices[done:], states[done:], rows, certain, possible, trees, budget)
-        found.append((lower[:more], upper[:more]))
-        done += more
-    empty = np.zeros(0, dtype=np.int64)
-    return np.concatenate([empty, *(low for low, _ in found)]), np.concatenate([empty, *(high for _, high in found)])
+
+    def __init__(self, ground: Ground, landmarks: Sequence[Landmark], weights: tuple[Numbers, Numbers]) -> None:
+        self.ground = ground
+        self.weights = weights
+        self.trees = ground.once(
+            f"{len(landmarks)} landmarks", weights, lambda: _weighed(ground.states, landmarks, weights)
+        )
+        self.mark = np.zeros(ground.states, dtype=np.int64)
+        self.queue = np.empty(ground.states, dtype=np.int32)
+        self.stamp = 1
+
+    def weigh(self, choices: Numbers, states: Numbers, visits: int | None = None) -> tuple[Numbers, Numbers, int]:
+        """Weigh the search trees of the first of `choices`, of the `states`: of one at least, of all if the work is little.
+
+        Returns
+        -------
+        lower, upper : array of int, ``[M]``
+            The weights of the first M choices.
+        spent : int
+            The visits made: about `visits` at most.
+        """
+        ground = self.ground
+        rows = ground.rows[1], ground.rows[2], ground.leaving_from, ground.leaving
+        budget = slice_visits(ground) if visits is None else min(visits, slice_visits(ground))
+        room = self.mark, self.queue, self.stamp
+        self.stamp += min(len(choices), CHUNK)  # before the marks are set: they are never set twice
+        kernel = compiled(rooted_weights, ground.work)
+        lower, upper, done, spent = kernel(
+            choices[:CHUNK], states[:CHUNK], rows, *self.weights, self.trees, room, budget
+        )
+        return lower[:done], upper[:done], spent
+
+
+def _weighed(states: int, landmarks: Sequence[Landmark], weights: tuple[Numbers, Numbers]) -> Trees:
+    """Return the trees for the kernel, with prefix sums of two weights, ``[S]`` each."""
+    certain = np.zeros((len(landmarks), states + 1), dtype=np.int64)
+    possible = certain if weights[0] is weights[1] else np.zeros_like(certain)
+    places = np.empty((4, len(landmarks), states), dtype=np.int32)
+    for k, known in enumerate(landmarks):
+        trees = known.forward, known.backward
+        for i, tree in enumerate(trees):
+            places[2 * i, k], places[2 * i + 1, k] = tree.position, tree.size
+        order = known.forward.order
+        for sums, weight in zip((certain, possible), weights, strict=True):
+            np.cumsum(weight[order], out=sums[k, 1 : len(order) + 1])
+            sums[k, len(order) + 1 :] = sums[k, len(order)]
+            if certain is possible:
+                break
+    roots = np.array([known.forward.root for known in landmarks], dtype=np.int64)
+    return Trees(
+        roots=roots,
+        position=places[0],
+        size=places[1],
+        certain=certain,
+        possible=possible,
+        back_position=places[2],
+        back_size=places[3],
+    )

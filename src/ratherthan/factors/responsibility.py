@@ -27,7 +27,7 @@ import numpy as np
 
 from ratherthan.factors.compare import Interval
 from ratherthan.model.mdp import Floats
-from ratherthan.solve.bellman import action_value_bounds, impact_bounds
+from ratherthan.solve.bellman import choice_bounds
 from ratherthan.solve.levels import ended_at
 from ratherthan.solve.solution import Solution
 
@@ -86,8 +86,9 @@ def responsibility(solution: Solution, *, objective: int = 0, policy_values: boo
     Responsibility
     """
     mdp = solution.problem.mdp
-    impact, impact_lower, impact_upper = impact_bounds(solution, objective, of_policy=policy_values)
-    action_value, action_lower, action_upper = action_value_bounds(solution, objective, of_policy=policy_values)
+    impacts, action_values = choice_bounds(solution, objective, of_policy=policy_values)
+    impact, impact_lower, impact_upper = impacts
+    action_value, action_lower, action_upper = action_values
     starts = mdp.state_to_choices[:-1]
     lambda_min = np.minimum.reduceat(action_value, starts)
     lambda_max = np.maximum.reduceat(action_value, starts)

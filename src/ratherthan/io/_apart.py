@@ -6,13 +6,18 @@ import json
 import os
 import signal
 import sys
-import tempfile
+import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 
+from ratherthan.io._leftovers import started, temporary_folder
+from ratherthan.model.watch import look
+
 __all__ = ["apart", "follow_parent"]
 
+LONGEST = 0.05
+"""Seconds between two looks at whether it has ended."""
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG of Linux
 
 
@@ -34,15 +39,16 @@ def apart(work: Callable[[], object]) -> None:
     if sys.platform != "linux":
         work()
         return
-    with tempfile.TemporaryDirectory(prefix="ratherthan-") as folder:
-        path = Path(folder) / "error.json"
+    with temporary_folder() as folder:
+        path = folder / "error.json"
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # of threads: the copy uses none
             child = os.fork()
         if child == 0:
             _work(work, path)
         try:
-            _, status = os.waitpid(child, 0)
+            with started(child):
+                status = _ended(child)
         except BaseException:
             os.kill(child, signal.SIGKILL)
             os.waitpid(child, 0)
@@ -57,12 +63,26 @@ def apart(work: Callable[[], object]) -> None:
         raise RuntimeError(f"it broke off ({f'signal {-code}' if code < 0 else f'exit code {code}'})")
 
 
+def _ended(child: int) -> int:
+    """Return the status of a process when it has ended; meanwhile limits hold."""
+    pause = 0.001
+    while True:
+        number, status = os.waitpid(child, os.WNOHANG)
+        if number:
+            return status
+        look()
+        time.sleep(pause)
+        pause = min(2.0 * pause, LONGEST)
+
+
 def _work(work: Callable[[], object], path: Path) -> None:
     """Do the work in the copy, and end it."""
     code = 1
     try:
         follow_parent()
+        signal.set_wakeup_fd(-1)  # that of the one that waits
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one that waits hears it, and ends the copy
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)

@@ -13,7 +13,7 @@ from ratherthan.errors import ModelError, SourceError
 from ratherthan.io._rows import Rows
 from ratherthan.model.mdp import Floats, Reward
 
-__all__ = ["Numbers", "Table", "array_of", "rewards_on", "table_of", "whole_numbers"]
+__all__ = ["Numbers", "Table", "array_of", "doubles", "offsets_and_targets", "rewards_on", "table_of", "whole_numbers"]
 
 Numbers = npt.NDArray[np.int64]
 ORDERS = {"ASS": "[A, S, S]", "SAS": "[S, A, S]"}
@@ -67,6 +67,26 @@ def array_of(value: Any, what: str) -> npt.NDArray[Any]:
     if array.dtype.kind not in "biuf":
         raise SourceError(f"{what} must be an array of numbers, got {array.dtype} of shape {array.shape}.")
     return array
+
+
+def settled(array: npt.NDArray[Any]) -> bool:
+    """Return whether nobody can change an array any more, so that a model may take it over without a copy."""
+    base: Any = array
+    while isinstance(base, np.ndarray):
+        if base.flags.writeable:
+            return False
+        base = base.base
+    return base is None or memoryview(base).readonly
+
+
+def doubles(array: npt.NDArray[Any]) -> Floats:
+    """Return an array as doubles of its own, or as it is where it is settled."""
+    return array if array.dtype == np.float64 and settled(array) else array.astype(np.float64)
+
+
+def offsets_and_targets(array: npt.NDArray[Any], what: str) -> npt.NDArray[Any]:
+    """Return whole numbers of 32 bits as they are where they are settled, all others as `whole_numbers` does."""
+    return array if array.dtype == np.int32 and settled(array) else whole_numbers(array, what)
 
 
 def whole_numbers(array: npt.NDArray[Any], what: str) -> Numbers:

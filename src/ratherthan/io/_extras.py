@@ -6,8 +6,9 @@ tools pass over them:
 ========================== ============================================================================================
 ``problem.json``           ``version`` (1), ``names`` (true where states have names), ``texts`` (of those below),
                            ``labels`` (of those below), ``world`` (``width``, ``height``, ``kinds``, ``zones``, ``note``,
-                           ``title``), ``objective``, ``properties``, ``others``, ``definitions``, ``lexicon``,
-                           ``notes``; each absent where there is none
+                           ``title``, ``frame``), ``cells`` (where states are called by the cells of ``world``: ``scale``,
+                           ``drawn``, ``zones``), ``objective``, ``properties``, ``others``, ``definitions``, ``lexicon``,
+                           ``notes``, ``lacks``; each absent where there is none
 ``names-offsets.bin``      where each state's name begins in ``names.bin`` and the last ends, uint64
 ``names.bin``              the names of the states in UTF-8
 ``text-0-offsets.bin`` …,  likewise what the numbers 0, 1, 2 … of each state variable in ``texts`` stand for
@@ -24,6 +25,7 @@ How an objective is written is told in `_objectives`.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, NoReturn
@@ -34,11 +36,12 @@ import numpy.typing as npt
 from ratherthan.errors import SourceError
 from ratherthan.io._objectives import read_objective, read_property, spelled
 from ratherthan.io._strings import PackedStrings, pack_strings
+from ratherthan.io.grids.names import CellNames
 from ratherthan.model.lexicon import Lexicon
 from ratherthan.model.mdp import MDP, Bools
 from ratherthan.model.objective import Objective, Threshold
 from ratherthan.model.problem import Problem
-from ratherthan.model.world import World
+from ratherthan.model.world import Frame, World
 
 __all__ = ["Extras", "packed_extras", "problem_of"]
 
@@ -68,7 +71,9 @@ def packed_extras(
     """
     table: dict[str, Any] = {}
     files: dict[str, bytes] = {}
-    if names is not None:
+    if isinstance(names, CellNames) and problem.world is not None:
+        table["cells"] = {"scale": names.scale, "drawn": list(names.drawn), "zones": list(names.zones)}
+    elif names is not None:
         table["names"] = True
         files |= _string_files("names", names)
     if texts:
@@ -88,14 +93,15 @@ def packed_extras(
         table["objective"] = spelled(problem.objective)
     if problem.properties:
         table["properties"] = {name: spelled(item) for name, item in problem.properties.items()}
-    if problem.others:
-        table["others"] = dict(problem.others)
-    if problem.definitions:
-        table["definitions"] = dict(problem.definitions)
     if problem.lexicon != Lexicon():
         table["lexicon"] = asdict(problem.lexicon)
-    if problem.notes:
-        table["notes"] = list(problem.notes)
+    plain = {
+        "others": dict(problem.others),
+        "definitions": dict(problem.definitions),
+        "lacks": problem.lacks,
+        "notes": list(problem.notes),
+    }
+    table |= {name: value for name, value in plain.items() if value}
     if not table:
         return {}
     text = json.dumps({"version": VERSION} | table, indent=1)
@@ -120,6 +126,8 @@ def _world_files(world: World) -> tuple[dict[str, Any], dict[str, bytes]]:
         "note": world.note,
         "title": world.title,
     }
+    if world.frame is not None:
+        table["frame"] = asdict(world.frame)
     files = {
         "cell-of-state.bin": world.cell_of_state.astype("<i4").tobytes(),
         "kind-of-cell.bin": world.kind_of_cell.astype(np.uint8).tobytes(),
@@ -176,14 +184,51 @@ class Extras:
             f"problem.json of '{self.shown}' must have {must}, got {shown}. Write the file anew.", path=self.shown
         )
 
-    def names(self, states: int) -> PackedStrings | None:
+    def names(self, states: int) -> Sequence[str] | None:
         """Return the names of the states, None where there are none."""
+        if "cells" in self.table:
+            return self._cell_names(states)
         if not self.table.get("names"):
             return None
         names = self._strings("names")
         if len(names) != states:
             self.fail(f"{states} names of states beside it", len(names))
         return names
+
+    def _cell_names(self, states: int) -> CellNames:
+        """Return the names of states that are called by the cells of the map."""
+        table, world = self._object(self.table["cells"], "cells"), self.world(states)
+        if world is None:
+            self.fail("a map where states are called by its cells", "none")
+        scale, drawn = self._whole(table.get("scale"), "scale"), table.get("drawn")
+        if not isinstance(drawn, list) or len(drawn) != 2:
+            self.fail("two whole numbers at 'drawn'", drawn)
+        wide, high = (self._whole(side, "drawn") for side in drawn)
+        if scale < 1 or -(-wide // scale) != world.width or -(-high // scale) != world.height:
+            self.fail(f"cells of the map's {world.width} × {world.height}", [scale, *drawn])
+        if (np.diff(world.cell_of_state) <= 0).any() or (world.cell_of_state < 0).any():
+            self.fail("each state in a cell of its own, in their order", "others")
+        zones = self._texts(table.get("zones"), "a list of strings at 'zones'")
+        strange = [zone for zone in zones if zone not in world.zones]
+        if strange:
+            self.fail("zones of the map", strange[0])
+        named = {zone: world.zones[zone] for zone in zones}
+        return CellNames(
+            world.cell_of_state, world.width, world.height, world.frame, named, scale=scale, drawn=(wide, high)
+        )
+
+    def _frame(self, value: Any) -> Frame | None:
+        """Return where the map lies in the world."""
+        if value is None:
+            return None
+        table = self._object(value, "frame")
+        numbers = [table.get(key) for key in ("resolution", "x", "y", "yaw")]
+        if not all(isinstance(n, int | float) and not isinstance(n, bool) and math.isfinite(n) for n in numbers):
+            self.fail("numbers at 'resolution', 'x', 'y' and 'yaw' of 'frame'", table)
+        if not table["resolution"] > 0:
+            self.fail("a 'resolution' above 0", table["resolution"])
+        resolution, x, y, yaw = (float(table[key]) for key in ("resolution", "x", "y", "yaw"))
+        return Frame(resolution=resolution, x=x, y=y, yaw=yaw)
 
     def texts(self) -> dict[str, PackedStrings]:
         """Return what the numbers of state variables stand for, by the variable."""
@@ -219,6 +264,7 @@ class Extras:
             zones={name: self._mask(f"zone-{i}.bin", width * height) for i, name in enumerate(zones)},
             note=self._text(table.get("note", ""), "note"),
             title=self._text(table.get("title", ""), "title"),
+            frame=self._frame(table.get("frame")),
         )
 
     def lexicon(self) -> Lexicon:
@@ -235,6 +281,10 @@ class Extras:
             states=words(table.get("states", {}), "states"),
             objectives={k: words(v, k) for k, v in self._object(table.get("objectives", {}), "objectives").items()},
         )
+
+    def lacks(self) -> str:
+        """Return what must still be given, empty where nothing is missing."""
+        return self._text(self.table.get("lacks", ""), "lacks")
 
     def stored_notes(self) -> tuple[str, ...]:
         """Return the notes that were written with the model, and those made here."""
@@ -306,4 +356,5 @@ def problem_of(mdp: MDP, extras: Extras, *, source: str, notes: tuple[str, ...])
         lexicon=extras.lexicon(),
         source=source,
         notes=extras.stored_notes() + notes,
+        lacks=extras.lacks(),
     )

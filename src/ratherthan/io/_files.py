@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
 from ratherthan.errors import SourceError
+from ratherthan.io._leftovers import unfinished
+from ratherthan.model.watch import room_for
 
 __all__ = ["Limits", "open_source", "size_text", "write_atomically"]
 
 GIB = 1 << 30
+WITH_COPIES = 1.5
+"""How many times its arrays a model takes while it is read and checked."""
 
 
 def _memory_bytes() -> int:
@@ -55,6 +60,7 @@ class Limits:
                 "Where the file can be trusted, read it with limits=Limits(most_bytes=…).",
                 path=path,
             )
+        room_for(WITH_COPIES * wanted, f"The model in '{path}'")
 
     def check_ratio(self, unpacked: int, packed: int, path: str) -> None:
         """Raise SourceError where far more comes out of a packed file than went in."""
@@ -144,29 +150,46 @@ def write_atomically(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     import secrets
 
     target, shown = Path(path), os.fspath(path)
-    if target.is_dir():
-        raise SourceError(
-            f"What is written must go to a file, but '{shown}' is a folder. Give a file name.", path=shown
-        )
+    check_target(path)
     part = target.with_name(f".{target.name[:80]}.{secrets.token_hex(6)}.part")
     try:
-        descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        with unfinished(part):
+            descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+            with os.fdopen(descriptor, "wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            part.replace(target)
     except OSError as error:
         raise _unwritable(shown, error) from error
+
+
+def check_target(path: str | os.PathLike[str], unlike: str | None = None) -> None:
+    """Raise SourceError where a file cannot be written for sure, or is the one at `unlike`: before anything long begins."""
+    target, shown = Path(path), os.fspath(path)
     try:
-        with os.fdopen(descriptor, "wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(target)
+        if target.is_dir():
+            raise SourceError(
+                f"What is written must go to a file, but '{shown}' is a folder. Give a file name.", path=shown
+            )
+        target.parent.stat()
     except OSError as error:
         raise _unwritable(shown, error) from error
-    finally:
-        part.unlink(missing_ok=True)
+    same = False
+    if unlike is not None:
+        with suppress(OSError, ValueError):  # a file that is not there is not the same
+            same = os.path.samefile(unlike, target)  # noqa: PTH121 - of a name that may be none
+    if same:
+        raise SourceError(
+            f"The answer must go to another file than the model comes from, but '{shown}' is both. Give another name.",
+            path=shown,
+        )
 
 
 def _unwritable(shown: str, error: OSError) -> SourceError:
+    full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    what_to_do = "Make room there, or write to another place" if full else "Check its folder"
     return SourceError(
-        f"'{shown}' must be writable, but it cannot be written: {error.strerror or error}. Check its folder.",
+        f"'{shown}' must be writable, but it cannot be written: {error.strerror or error}. {what_to_do}.",
         path=shown,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from typing import IO, Any
 
@@ -10,9 +11,10 @@ import numpy.typing as npt
 
 from ratherthan.errors import SourceError
 
-__all__ = ["array_from"]
+__all__ = ["array_from", "mapped_array"]
 
 CHUNK = 1 << 24
+LONGEST_HEADER = 1 << 16
 
 
 def array_from(stream: IO[bytes], file_size: int, shown: str) -> npt.NDArray[Any]:
@@ -34,6 +36,40 @@ def array_from(stream: IO[bytes], file_size: int, shown: str) -> npt.NDArray[Any
     ValueError, EOFError
         Where it is damaged.
     """
+    shape, in_columns, dtype = _header(stream, file_size, shown)
+    count = math.prod(shape)
+    size = count * dtype.itemsize
+    data = np.empty(size, dtype=np.uint8)
+    done = 0
+    while done < size:
+        got = stream.readinto(data.data[done : done + CHUNK])  # type: ignore[attr-defined]
+        if not got:
+            raise EOFError(f"{shown} breaks off")
+        done += got
+    if stream.read(1):
+        raise ValueError(f"{shown} is longer than its header says")
+    data.flags.writeable = False  # nobody else holds it: a model takes it over as it is
+    array = data.view(dtype) if dtype.itemsize else np.zeros(count, dtype=dtype)
+    return array.reshape(shape, order="F" if in_columns else "C")
+
+
+def mapped_array(data: npt.NDArray[np.uint8], shown: str) -> npt.NDArray[Any] | None:
+    """Return the array of a ``.npy`` file that lies in memory, as a part of it; None where it does not lie so that it can be.
+
+    Parameters and errors as in `array_from`.
+    """
+    stream = io.BytesIO(data[:LONGEST_HEADER].tobytes())
+    shape, in_columns, dtype = _header(stream, len(data), shown)
+    begin, count = stream.tell(), math.prod(shape)
+    if begin + count * dtype.itemsize != len(data):
+        raise ValueError(f"{shown} is longer or shorter than its header says")
+    if not dtype.itemsize or (data.ctypes.data + begin) % dtype.alignment:
+        return None
+    return data[begin:].view(dtype).reshape(shape, order="F" if in_columns else "C")
+
+
+def _header(stream: IO[bytes], file_size: int, shown: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Return the shape, whether columns come first, and the type of an array, once it is sure that it holds plain values."""
     version = np.lib.format.read_magic(stream)
     if version not in ((1, 0), (2, 0)):
         raise ValueError(f"format version {version[0]}.{version[1]} of {shown} is not 1.0 or 2.0")
@@ -49,14 +85,4 @@ def array_from(stream: IO[bytes], file_size: int, shown: str) -> npt.NDArray[Any
     size = count * dtype.itemsize
     if any(n < 0 for n in shape) or size > file_size or (dtype.itemsize == 0 and count > file_size):
         raise ValueError(f"by its header {shown} has {size} bytes, got {file_size}")
-    data = np.empty(size, dtype=np.uint8)
-    done = 0
-    while done < size:
-        got = stream.readinto(data.data[done : done + CHUNK])  # type: ignore[attr-defined]
-        if not got:
-            raise EOFError(f"{shown} breaks off")
-        done += got
-    if stream.read(1):
-        raise ValueError(f"{shown} is longer than its header says")
-    array = data.view(dtype) if dtype.itemsize else np.zeros(count, dtype=dtype)
-    return array.reshape(shape, order="F" if in_columns else "C")
+    return shape, in_columns, dtype

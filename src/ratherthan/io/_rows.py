@@ -27,8 +27,8 @@ class Rows:
     rewards: Mapping[str, Reward]
 
 
-def checked_offsets(offsets: npt.NDArray[np.integer[Any]], count: int, name: str) -> npt.NDArray[np.int64]:
-    """Return offsets that rise from 0 to `count` as int64, whose range they then cannot leave.
+def checked_offsets(offsets: npt.NDArray[np.integer[Any]], count: int, name: str) -> Ints:
+    """Return offsets that rise from 0 to `count` as signed numbers, whose range they then cannot leave.
 
     Raises
     ------
@@ -47,11 +47,11 @@ def checked_offsets(offsets: npt.NDArray[np.integer[Any]], count: int, name: str
         )
     if offsets[-1] != count:
         raise ModelError(f"{name} must end at {count}, got {int(offsets[-1])}. Write the file anew.")
-    return offsets.astype(np.int64)
+    return _signed(offsets)
 
 
-def checked_targets(values: npt.NDArray[np.unsignedinteger[Any]], count: int, what: str) -> npt.NDArray[np.int64]:
-    """Return indices below `count` as int64.
+def checked_targets(values: npt.NDArray[np.integer[Any]], count: int, what: str) -> Ints:
+    """Return indices from 0 on and below `count` as signed numbers.
 
     Raises
     ------
@@ -64,7 +64,14 @@ def checked_targets(values: npt.NDArray[np.unsignedinteger[Any]], count: int, wh
         raise ModelError(
             f"{what} must lie in 0 … {count - 1}, got {int(values[at])} at entry {at}. Write the file anew.", entry=at
         )
-    return values.astype(np.int64)
+    return _signed(values)
+
+
+def _signed(values: npt.NDArray[np.integer[Any]]) -> Ints:
+    """Return numbers in 32 bits as they are, others in 64."""
+    signed: Any = values if values.dtype == np.int32 else values.astype(np.int64)
+    made: Ints = signed
+    return made
 
 
 def with_loops(rows: Rows) -> tuple[Rows, tuple[str, ...]]:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import re
 import signal
-import tempfile
 import threading
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
@@ -25,6 +24,7 @@ import numpy as np
 from ratherthan.errors import MissingExtraError, ModelError, RatherthanError, SourceError
 from ratherthan.io._apart import apart
 from ratherthan.io._constants import Constant, Value
+from ratherthan.io._leftovers import temporary_folder
 from ratherthan.io._storm_names import RANGE_BIT, Symbolic, finished
 from ratherthan.io.umb import read_umb
 from ratherthan.model.problem import Problem
@@ -151,8 +151,8 @@ def build(symbolic: Symbolic, values: Mapping[str, Value], *, hidden: Collection
     """
     shown = symbolic.shown
     filled = {item.name: _unused(item) for item in symbolic.constants if not item.defined} | dict(values)
-    with tempfile.TemporaryDirectory(prefix="ratherthan-") as folder:
-        path = Path(folder) / "model.umb"
+    with temporary_folder() as folder:
+        path = folder / "model.umb"
         with at_work(shown, "build") as stormpy:
             program, _ = stormpy.instantiate_constants(symbolic.program, filled)
             apart(lambda: _export(stormpy, program, path))

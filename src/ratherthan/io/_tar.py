@@ -9,6 +9,8 @@ the size that it expects.
 
 from __future__ import annotations
 
+import mmap
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
@@ -26,6 +28,9 @@ BLOCK = 512
 LONGEST_NAME = 1 << 16
 MOST_TRAILING = 1 << 20
 MOST_MEMBERS = 1_000_000
+MAPPED = 1 << 20
+"""From how many bytes on a member is mapped into memory."""
+WORDS = 1 << 17
 
 
 def is_tar(head: bytes) -> bool:
@@ -57,6 +62,7 @@ class Archive:
         self._open = 0  # bytes of the current member not yet read, and the padding behind it
         self._padding = 0
         self._begun = False
+        self._map: mmap.mmap | None = None
 
     def members(self) -> Iterator[Member]:
         """Yield the archive's files in their order; what is not read of one is passed over.
@@ -80,10 +86,59 @@ class Archive:
             yield Member(name=name, size=size)
 
     def read(self, member: Member) -> npt.NDArray[np.uint8]:
-        """Return the bytes of the member that `members` has just yielded; its size must have been checked."""
+        """Return the bytes of the member that `members` has just yielded, read-only; its size must have been checked.
+
+        Those of a large member of an archive that is not packed are not read: the file is mapped into memory.
+        """
+        if member.size >= MAPPED and (mapped := self._mapped(member)) is not None:
+            return mapped
         data = np.empty(member.size, dtype=np.uint8)
         view = data.data
         for start in range(0, member.size, 16 * CHUNK):
+            self._take(view[start : start + 16 * CHUNK])
+        data.flags.writeable = False
+        return data
+
+    def read_words(self, member: Member) -> npt.NDArray[np.int32] | npt.NDArray[np.uint64]:
+        """Return the words of 64 bits of the member that `members` has just yielded, in 32 bits where all of them fit."""
+        words = np.empty(member.size // 8, dtype=np.int32)
+        block = np.empty(min(len(words), WORDS), dtype="<u8")
+        for first in range(0, len(words), WORDS):
+            part = block[: len(words) - first]
+            self._take(part.view(np.uint8).data)
+            if part.max() >= 1 << 31:
+                wide = np.empty(len(words), dtype="<u8")
+                wide[:first], wide[first : first + len(part)] = words[:first], part
+                self._take(wide[first + len(part) :].view(np.uint8).data)
+                return wide
+            words[first : first + len(part)] = part
+        return words
+
+    def _mapped(self, member: Member) -> npt.NDArray[np.uint8] | None:
+        """Return a member as a part of the mapped file; None where it is packed, or no file of the system's."""
+        if self.stream.packing:
+            return None
+        try:
+            descriptor = self.stream.file.fileno()
+            begin, size = self.stream.file.tell(), os.fstat(descriptor).st_size
+            if begin + member.size > size:
+                return None
+            if self._map is None:
+                self._map = mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ)
+        except (OSError, ValueError):
+            return None
+        self.stream.skip(member.size)
+        self._open = 0
+        return np.frombuffer(self._map, dtype=np.uint8, count=member.size, offset=begin)
+
+    def read_part(self, begin: int, end: int) -> npt.NDArray[np.uint8]:
+        """Return the bytes from `begin` to `end` of the member that `members` has just yielded; before, nothing of it is read."""
+        data = np.empty(end - begin, dtype=np.uint8)
+        if not self.stream.skip(begin):
+            raise self._fault("breaks off in the middle of a member", "Copy it anew.")
+        self._open -= begin
+        view = data.data
+        for start in range(0, len(data), 16 * CHUNK):
             self._take(view[start : start + 16 * CHUNK])
         return data
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
-import numpy as np
 import numpy.typing as npt
 
 from ratherthan.errors import SourceError
@@ -14,7 +13,8 @@ from ratherthan.io._umb_index import Header, bits_size, parse_index
 
 __all__ = ["OWN", "read_contents", "read_header"]
 
-Bytes = npt.NDArray[np.uint8]
+Array = npt.NDArray[Any]
+WORDS = frozenset({"state-to-choices.bin", "choice-to-branches.bin", "branch-to-target.bin"})
 LONGEST_INDEX = 16 << 20
 OWN = "ratherthan/"
 """The folder in which what the format has no place for is kept: see `ratherthan.io._extras`."""
@@ -88,8 +88,8 @@ def _sizes(header: Header) -> dict[str, int]:
     return sizes
 
 
-def read_contents(file: BinaryIO, header: Header, limits: Limits, shown: str) -> dict[str, Bytes]:
-    """Return the bytes of the files that are needed, each of the size that the index demands.
+def read_contents(file: BinaryIO, header: Header, limits: Limits, shown: str) -> dict[str, Array]:
+    """Return the bytes of the files that are needed, each of the size that the index demands; those of `WORDS` as numbers.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def read_contents(file: BinaryIO, header: Header, limits: Limits, shown: str) ->
     if header.valuations is not None:
         folder = "valuations/states"
         free |= {f"{folder}/valuations.bin", f"{folder}/strings.bin", f"{folder}/string-mapping.bin"}
-    data: dict[str, Bytes] = {}
+    data: dict[str, Array] = {}
     total = 0
     archive = Archive(file, limits, shown)
     for member in archive.members():
@@ -124,5 +124,5 @@ def read_contents(file: BinaryIO, header: Header, limits: Limits, shown: str) ->
             )
         total += member.size
         limits.check_bytes(total, shown)
-        data[member.name] = archive.read(member)
+        data[member.name] = archive.read_words(member) if member.name in WORDS else archive.read(member)
     return data

@@ -27,7 +27,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ratherthan.errors import SourceError
-from ratherthan.io._array_forms import Numbers, array_of, rewards_on, table_of, whole_numbers
+from ratherthan.io._array_forms import (
+    Numbers,
+    array_of,
+    doubles,
+    offsets_and_targets,
+    rewards_on,
+    table_of,
+    whole_numbers,
+)
 from ratherthan.io._rows import Rows, checked_offsets, with_loops
 from ratherthan.model.mdp import MDP, Bools, Reward
 from ratherthan.model.names import StateNames
@@ -177,7 +185,7 @@ def _compressed(rows: Mapping[str, Any], rewards: Any) -> Rows:
     for name, array in arrays.items():
         if array.ndim != 1 or (name.startswith(("state_to", "choice_to_b")) and len(array) < 2):
             raise SourceError(f"{name} must be one-dimensional and not empty, got shape {array.shape}.")
-    numbers = {name: whole_numbers(arrays[name], name) for name in arrays if name != "branch_to_probability"}
+    numbers = {name: offsets_and_targets(arrays[name], name) for name in arrays if name != "branch_to_probability"}
     choices, branches = len(numbers["choice_to_branches"]) - 1, len(numbers["branch_to_target"])
     action = numbers.get("choice_to_action", np.full(choices, -1))
     if len(action) and int(action.max()) >= 2**31:
@@ -197,7 +205,7 @@ def _compressed(rows: Mapping[str, Any], rewards: Any) -> Rows:
         state_to_choices=checked_offsets(numbers["state_to_choices"], choices, "state_to_choices"),
         choice_to_branches=checked_offsets(numbers["choice_to_branches"], branches, "choice_to_branches"),
         branch_to_target=numbers["branch_to_target"],
-        branch_to_probability=arrays["branch_to_probability"].astype(np.float64),
+        branch_to_probability=doubles(arrays["branch_to_probability"]),
         choice_to_action=action,
         rewards=parts,
     )
@@ -224,10 +232,7 @@ def _reward_parts(rewards: Any) -> dict[str, Reward]:
                 f"Reward '{name}' must be a table of {', '.join(PARTS)}, got {', '.join(map(str, value))}."
             )
         found[str(name)] = Reward(
-            **{
-                part: array_of(values, f"reward '{name}' on {part}").astype(np.float64)
-                for part, values in value.items()
-            }
+            **{part: doubles(array_of(values, f"reward '{name}' on {part}")) for part, values in value.items()}
         )
     return found
 

@@ -13,6 +13,8 @@ NumPy archive  ``.npz``; a zip archive                              `ratherthan.
 PRISM          ``.prism .nm .pm .sm``; ``mdp`` or ``dtmc``          `ratherthan.io.prism`
 JANI           ``.jani``; ``"jani-version"`` in a JSON object       `ratherthan.io.jani`
 DRN            ``.drn .drn.gz .drn.xz``; a line ``@type:``          `ratherthan.io.drn`
+MovingAI map   ``.map``; ``type octile`` … ``map``                   `ratherthan.io.grids`
+ROS map        ``.yaml .yml``; ``image:`` and ``resolution:``       `ratherthan.io.grids`
 Gymnasium      ``gym:NAME``, ``gym:NAME,key=value``; an environment `ratherthan.io.gymnasium`
 its table      ``.json.gz``; ``"nS"`` or ``"P"`` in a JSON object   `ratherthan.io.gymnasium`
 object         a Problem or MDP as it is; arrays                    `ratherthan.io.arrays`
@@ -29,7 +31,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ratherthan.errors import PropertyError, SourceError
+from ratherthan.errors import PropertyError, QuestionError, SourceError
 from ratherthan.io._files import open_source
 from ratherthan.io._tar import is_tar
 from ratherthan.io._unpacking import packing_of
@@ -37,6 +39,7 @@ from ratherthan.model.mdp import MDP
 from ratherthan.model.objective import Threshold
 from ratherthan.model.problem import Problem
 from ratherthan.model.states import start_of, state_number
+from ratherthan.model.watch import phase
 
 __all__ = ["read", "start_of", "state_number", "write"]
 
@@ -48,12 +51,13 @@ PRISM_WORD = re.compile(
     rb"^\s*(mdp|dtmc|nondeterministic|probabilistic|ctmc|stochastic|pta|pomdp|smg|module)\s", re.MULTILINE
 )
 DRN_LINE = re.compile(rb"^@type:", re.MULTILINE)
+ROS_LINES = tuple(re.compile(rb"^%s[ \t]*:" % key, re.MULTILINE) for key in (b"image", b"resolution", b"origin"))
 ROADMAP_LINE = re.compile(rb"^map\s*=\s*('''|\"\"\"|'|\")", re.MULTILINE)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Adapter:
-    """What reads one kind of file: its function, its suffixes, and whether it is text with constants to be set."""
+    """What reads one kind of file: its function, its suffixes, whether it is text, has constants to be set, or cells to drive on."""
 
     kind: str
     module: str
@@ -61,6 +65,7 @@ class Adapter:
     suffixes: tuple[str, ...]
     constants: bool = False
     text: bool = False
+    grid: bool = False
 
     def load(self) -> Callable[..., Problem]:
         """Return the function."""
@@ -88,7 +93,18 @@ DRN = Adapter(
     suffixes=(".drn", ".drn.gz", ".drn.xz"),
 )
 TABLE = Adapter(kind="a table of an environment", module="gymnasium", function="read_table", suffixes=(".json.gz",))
-ADAPTERS = (ROADMAP, UMB, NPZ, PRISM, JANI, DRN, TABLE)
+MOVINGAI = Adapter(
+    kind="a MovingAI map", module="grids.gridmap", function="read_grid", suffixes=(".map",), text=True, grid=True
+)
+ROSMAP = Adapter(
+    kind="a map of the ROS map server",
+    module="grids.gridmap",
+    function="read_grid",
+    suffixes=(".yaml", ".yml"),
+    text=True,
+    grid=True,
+)
+ADAPTERS = (ROADMAP, MOVINGAI, ROSMAP, UMB, NPZ, PRISM, JANI, DRN, TABLE)
 PREFIX = "example:"
 GYM = Adapter(kind="a Gymnasium environment", module="gymnasium", function="read_gymnasium", suffixes=())
 GYM_PREFIX = "gym:"
@@ -107,7 +123,7 @@ def read(
     *,
     constants: str | Mapping[str, Any] | None = None,
     objective: str | None = None,
-    start: str | int | None = None,
+    start: str | int | tuple[int, int] | None = None,
     properties: Sequence[str] = (),
     **options: Any,
 ) -> Problem:
@@ -123,12 +139,16 @@ def read(
     objective : str, optional
         What is wanted: a property in PRISM's syntax, the name of one that comes with the source, or one of a file of
         properties: ``FILE.props`` if it has one, else ``FILE.props:NAME``.
-    start : int or str, optional
-        The state to start from, a number or an exact name, in place of the model's initial states.
+    start : int, str or pair of int, optional
+        The state to start from, a number or an exact name, in place of the model's initial states; on a map of cells a place:
+        column and row, or a point in metres as ``"1.2m,3.4m"``.
     properties : sequence of str
         More texts like `objective`, of which those from files come along in the problem's properties.
     **options
-        Handed to the adapter: `limits` of archives, `rewards`, `labels` … of arrays, arguments of an environment.
+        Handed to the adapter: `limits` of archives, `rewards`, `labels` … of arrays, arguments of an environment. Of a map of
+        cells: `goal` (``(3, 14)``, ``"3,14"`` or in metres ``"1.2m,3.4m"``; so may `start` be) or `scen` and `row` of a
+        scenario file; `slip`, `stay`, `directions`, `speed`; `radius`, `cell`, `safe`; `zones`, `unknown`. None of them is
+        needed: None stands for the default.
 
     Returns
     -------
@@ -145,7 +165,13 @@ def read(
     QuestionError
         Where there is no such state to start from.
     """
-    problem = _read_with(source, constants or None, options, (*properties, *([] if objective is None else [objective])))
+    if start is not None and _has_cells(source):
+        options, start = options | {"start": start}, None
+    called = f" '{source}'" if isinstance(source, str | os.PathLike) else " a model"
+    with phase(f"reading{called}"):
+        problem = _read_with(
+            source, constants or None, options, (*properties, *([] if objective is None else [objective]))
+        )
     if objective is not None:
         from ratherthan.model.property import choose_objective
 
@@ -160,6 +186,8 @@ def read(
     if start is not None:
         import numpy as np
 
+        if isinstance(start, tuple):
+            raise QuestionError(f"A pair of column and row must be a cell of a map of cells, but '{source}' is none.")
         mdp = replace(problem.mdp, initial=np.array([state_number(problem.mdp, start)]))
         problem = replace(problem, mdp=mdp)
     return problem
@@ -177,8 +205,17 @@ def _read_with(
     return read_with_files(lambda given: _read(source, given, options), constants, asked)
 
 
+def _has_cells(source: Any) -> bool:
+    """Return whether a source is a map of cells, whose places are told by where they lie."""
+    if not isinstance(source, str | os.PathLike) or str(source).startswith((PREFIX, GYM_PREFIX)):
+        return False
+    return _adapter_of(source).grid
+
+
 def _read(source: Any, constants: str | Mapping[str, Any] | None, options: dict[str, Any]) -> Problem:
     """Read a source of any kind, without what was asked of it."""
+    if not _has_cells(source):
+        options = _without_driving(source, options)
     if isinstance(source, str) and source.startswith(PREFIX):
         _refuse_constants(constants, EXAMPLE, source)
         return EXAMPLE.load()(source.removeprefix(PREFIX), **options)
@@ -206,6 +243,22 @@ def _read(source: Any, constants: str | Mapping[str, Any] | None, options: dict[
     from ratherthan.io.arrays import from_arrays
 
     return from_arrays(**source, **options) if isinstance(source, Mapping) else from_arrays(source, **options)
+
+
+def _without_driving(source: Any, options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options without those for maps of cells, which are refused where one is given."""
+    if not isinstance(source, str | os.PathLike):
+        return options
+    from ratherthan.io.grids.drive import KEYS
+
+    given = [key for key in KEYS if options.get(key) is not None]
+    if given and not str(source).startswith(GYM_PREFIX):
+        raise SourceError(
+            f"Only a map of cells (.map, .yaml) can be asked for {', '.join(given)}, but '{source}' is none. Leave "
+            f"{'it' if len(given) == 1 else 'them'} out.",
+            path=str(source),
+        )
+    return {key: value for key, value in options.items() if key not in KEYS or value is not None}
 
 
 def _refuse_constants(constants: object, adapter: Adapter, shown: str) -> None:
@@ -236,6 +289,7 @@ def _adapter_of(path: str | os.PathLike[str]) -> Adapter:
 
 def _by_content(head: bytes, shown: str) -> Adapter:
     from ratherthan.io._gym_json import is_table
+    from ratherthan.io.grids.movingai import MAP_LINES
 
     if is_table(head):
         return TABLE
@@ -248,6 +302,10 @@ def _by_content(head: bytes, shown: str) -> Adapter:
     if b"\x00" not in head:
         if ROADMAP_LINE.search(head):
             return ROADMAP
+        if MAP_LINES.match(head):
+            return MOVINGAI
+        if all(line.search(head) for line in ROS_LINES):
+            return ROSMAP
         if DRN_LINE.search(head):
             return DRN
         if PRISM_WORD.search(COMMENTS.sub(b" ", head)):
@@ -285,4 +343,5 @@ def write(problem: Problem, path: str | os.PathLike[str], **options: Any) -> Non
             path=os.fspath(path),
         )
     module, function = WRITERS[suffix]
-    getattr(importlib.import_module(f"ratherthan.io.{module}"), function)(problem, path, **options)
+    with phase(f"writing '{os.fspath(path)}'"):
+        getattr(importlib.import_module(f"ratherthan.io.{module}"), function)(problem, path, **options)

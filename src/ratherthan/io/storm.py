@@ -16,7 +16,7 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from ratherthan.errors import MissingExtraError, PropertyError, SourceError
+from ratherthan.io._leftovers import started, temporary_folder
 from ratherthan.io._storm_text import Translated, translated
 from ratherthan.io._storm_words import outer_filter
 from ratherthan.io.umb_write import write_umb
@@ -33,9 +34,11 @@ from ratherthan.model.mdp import MDP, Bools, Floats, Reward
 from ratherthan.model.names import StateNames
 from ratherthan.model.problem import Problem
 from ratherthan.model.states import start_of
+from ratherthan.model.watch import look
 
 __all__ = ["StormAnswer", "ask_storm", "storm_is_there"]
 
+_LOOK = 0.2
 _PATIENCE = 3600.0
 """For how many seconds Storm may work on a property."""
 _PATIENCE_FOR_MEANS = 30.0
@@ -127,8 +130,7 @@ def _asked(problem: Problem, wanted: Translated, *, every: bool) -> tuple[StormA
     """Ask Storm in a process of its own; return its answer at the start, and in every state if that is asked for."""
     _check_signs(wanted)
     wanted, raised = _raised(wanted)
-    with tempfile.TemporaryDirectory(prefix="ratherthan-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         chain = problem.mdp.choices == problem.mdp.states and not wanted.chosen
         write_umb(_bare(problem.mdp, wanted), folder / "model.umb", packing="none", players=0 if chain else 1)
         question = {"text": wanted.text, "every": every}
@@ -204,18 +206,31 @@ def _run(folder: Path, patience: float) -> int:
         stderr=subprocess.DEVNULL,
     )
     try:
-        return process.wait(timeout=patience)
-    except subprocess.TimeoutExpired:
+        with started(process.pid):
+            code = _waited(process, patience)
+        if code is not None:
+            return code
         process.kill()
         process.wait()
         raise SourceError(
             f"Storm must come to an answer in time, but after {patience:g} seconds it has none{_why(patience)}. "
             "Ask for something smaller, or bound the number of steps."
-        ) from None
+        )
     except BaseException:
         process.kill()
         process.wait()
         raise
+
+
+def _waited(process: subprocess.Popen[bytes], patience: float) -> int | None:
+    """Return the exit code of a process, None where it has not ended in time; meanwhile limits hold."""
+    until = time.monotonic() + patience
+    while time.monotonic() < until:
+        try:
+            return process.wait(timeout=_LOOK)
+        except subprocess.TimeoutExpired:
+            look()
+    return None
 
 
 def _why(patience: float) -> str:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -31,13 +32,13 @@ from ratherthan.io._umb_archive import OWN, read_contents, read_header
 from ratherthan.io._umb_index import Annotation, Header, Kind
 from ratherthan.io._umb_valuations import Columns
 from ratherthan.io._unpacking import packing_of
-from ratherthan.model.mdp import MDP, Floats, Reward
+from ratherthan.model.mdp import MDP, Floats, Ints, Reward
 from ratherthan.model.names import StateNames
 from ratherthan.model.problem import Problem
 
 __all__ = ["read_umb"]
 
-Bytes = npt.NDArray[np.uint8]
+Array = npt.NDArray[Any]
 
 
 def read_umb(path: str | os.PathLike[str], *, limits: Limits | None = None) -> Problem:
@@ -82,7 +83,7 @@ def read_umb(path: str | os.PathLike[str], *, limits: Limits | None = None) -> P
 class _Model:
     """Puts the arrays of an archive together."""
 
-    def __init__(self, header: Header, data: dict[str, Bytes], shown: str) -> None:
+    def __init__(self, header: Header, data: dict[str, Array], shown: str) -> None:
         self.header, self.data, self.shown = header, data, shown
         self.notes = list(header.notes)
 
@@ -127,11 +128,11 @@ class _Model:
         )
         return problem_of(mdp, extras, source=self.shown, notes=tuple(self.notes))
 
-    def offsets(self, name: str, rows: int, entries: int, row: str, entry: str) -> npt.NDArray[np.int64]:
+    def offsets(self, name: str, rows: int, entries: int, row: str, entry: str) -> Ints:
         """Return a CSR file as offsets; absent, each row has one entry."""
         data = self.data.get(name)
         if data is not None:
-            return checked_offsets(data.view("<u8"), entries, name)
+            return checked_offsets(data, entries, name)
         if rows != entries:
             raise SourceError(
                 f"'{self.shown}' must have {name}, as it has {rows} {row}s but {entries} {entry}. Write the archive anew.",
@@ -139,14 +140,14 @@ class _Model:
             )
         return np.arange(rows + 1, dtype=np.int64)
 
-    def targets(self) -> npt.NDArray[np.int64]:
+    def targets(self) -> Ints:
         data = self.data.get("branch-to-target.bin")
         if data is None:
             raise SourceError(
                 f"'{self.shown}' must have branch-to-target.bin, but it is missing. Write the archive anew.",
                 path=self.shown,
             )
-        return checked_targets(data.view("<u8"), self.header.states, "Targets of branches")
+        return checked_targets(data, self.header.states, "Targets of branches")
 
     def probabilities(self) -> Floats:
         """Return the probability of every branch; absent, it is 1 and no choice may have two branches."""
@@ -160,13 +161,13 @@ class _Model:
             )
         return np.ones(self.header.branches)
 
-    def actions(self) -> tuple[tuple[str, ...], npt.NDArray[np.int64]]:
+    def actions(self) -> tuple[tuple[str, ...], Ints]:
         """Return the names of the actions, and the action of every choice, -1 where its name is empty."""
         count, choices = self.header.choice_actions, self.header.choices
         numbers, strings = self.data.get("actions/choices/values.bin"), self.strings("actions/choices")
         if count == 0 or (strings is None and count > choices):
             return (), np.full(choices, -1)
-        action = np.zeros(choices, dtype=np.int64)
+        action: Ints = np.zeros(choices, dtype=np.int32)
         if numbers is not None:
             action = checked_targets(numbers.view("<u4"), count, "Actions of choices")
         if strings is None:
@@ -177,7 +178,7 @@ class _Model:
                 f"There must be one name per action ({count}), got {len(strings)}. Write the archive anew."
             )
         named = np.array([bool(string) for string in strings])
-        position = np.where(named, np.cumsum(named) - 1, -1)
+        position = np.where(named, np.cumsum(named) - 1, -1).astype(np.int32)
         return tuple(string for string in strings if string), position[action]
 
     def strings(self, folder: str) -> PackedStrings | None:
@@ -256,7 +257,7 @@ class _Model:
         return StateNames(count=states, variables=columns)
 
 
-def _numbers(data: Bytes, kind: Kind) -> Floats:
+def _numbers(data: Array, kind: Kind) -> Floats:
     """Return stored numbers as doubles, fractions as the nearest."""
     if kind.name == "double":
         return data.view("<f8")

@@ -11,14 +11,11 @@ folder; names of states are there only.
 
 from __future__ import annotations
 
-import gzip
-import io
 import json
 import os
 import re
-import tarfile
 from collections.abc import Iterable
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,13 +24,13 @@ from ratherthan.errors import SourceError
 from ratherthan.io._extras import packed_extras
 from ratherthan.io._files import write_atomically
 from ratherthan.io._strings import pack_strings
+from ratherthan.io._tar_writer import PACKINGS, Numbers, write_tar
 from ratherthan.io._umb_valuations import pack_columns
 from ratherthan.model.mdp import MDP, Bools
 from ratherthan.model.problem import Problem
 
 __all__ = ["write_umb"]
 
-PACKINGS = ("gzip", "none")
 OFTEN_RESERVED = "init"
 """Storm calls the initial states so, and refuses a label of that name."""
 
@@ -47,7 +44,7 @@ def write_umb(problem: Problem, path: str | os.PathLike[str], *, packing: str = 
     path : path
         Replaced only once the new file is whole.
     packing : str
-        ``"gzip"`` or ``"none"``; unpacked archives are larger, and faster to write and to read.
+        ``"gzip"``, ``"xz"`` (smaller and much slower) or ``"none"``: ten times as large, and read by mapping it into memory.
     players : int
         1, an MDP; or 0 for a model with one choice per state, which is then called a DTMC.
 
@@ -60,32 +57,18 @@ def write_umb(problem: Problem, path: str | os.PathLike[str], *, packing: str = 
         raise SourceError(f"A UMB file must be packed by one of {', '.join(PACKINGS)}, got '{packing}'.")
     files = _files(problem, players)
     with write_atomically(path) as file:
-        if packing == "none":
-            _write_tar(file, files)
-            return
-        with gzip.GzipFile(filename="", mode="wb", compresslevel=6, fileobj=file, mtime=0) as packed:
-            _write_tar(packed, files)  # type: ignore[arg-type]
+        write_tar(file, files, packing)
 
 
-def _write_tar(file: BinaryIO, files: dict[str, bytes | memoryview]) -> None:
-    """Write the files in their order, without owners, times or folders."""
-    large = any(len(data) >= 8 << 30 for data in files.values())
-    with tarfile.open(fileobj=file, mode="w", format=tarfile.GNU_FORMAT if large else tarfile.USTAR_FORMAT) as archive:
-        for name, data in files.items():
-            member = tarfile.TarInfo(name)
-            member.size, member.mode = len(data), 0o644
-            archive.addfile(member, io.BytesIO(data))
-
-
-def _files(problem: Problem, players: int) -> dict[str, bytes | memoryview]:
+def _files(problem: Problem, players: int) -> dict[str, bytes | Numbers]:
     """Return every file of the archive by name, the index first."""
     mdp = problem.mdp
-    files: dict[str, bytes | memoryview] = {
+    files: dict[str, bytes | Numbers] = {
         "state-to-choices.bin": _words(mdp.state_to_choices),
         "state-is-initial.bin": _bits(np.isin(np.arange(mdp.states), mdp.initial)),
         "choice-to-branches.bin": _words(mdp.choice_to_branches),
         "branch-to-target.bin": _words(mdp.branch_to_target),
-        "branch-to-probability.bin": _plain(mdp.branch_to_probability, "<f8"),
+        "branch-to-probability.bin": Numbers(mdp.branch_to_probability, "<f8"),
     }
     action_count = _add_actions(mdp, files)
     held_back = {name: mask for name, mask in mdp.labels.items() if name == OFTEN_RESERVED}
@@ -120,12 +103,8 @@ def _files(problem: Problem, players: int) -> dict[str, bytes | memoryview]:
     return {"index.json": json.dumps(index, indent=1).encode("ascii")} | files
 
 
-def _plain(array: npt.NDArray[Any], dtype: str) -> memoryview:
-    return np.ascontiguousarray(array, dtype=dtype).view(np.uint8).data
-
-
-def _words(array: npt.NDArray[Any]) -> memoryview:
-    return _plain(array, "<u8")
+def _words(array: npt.NDArray[Any]) -> Numbers:
+    return Numbers(array, "<u8")
 
 
 def _bits(mask: Bools) -> bytes:
@@ -133,7 +112,7 @@ def _bits(mask: Bools) -> bytes:
     return np.packbits(np.pad(mask, (0, -len(mask) % 64)), bitorder="little").tobytes()
 
 
-def _add_actions(mdp: MDP, files: dict[str, bytes | memoryview]) -> int:
+def _add_actions(mdp: MDP, files: dict[str, bytes | Numbers]) -> int:
     """Add the actions, an empty one last where some choice has no name; return how many there are."""
     unnamed = mdp.choice_to_action < 0
     actions = list(mdp.actions)
@@ -146,7 +125,7 @@ def _add_actions(mdp: MDP, files: dict[str, bytes | memoryview]) -> int:
     else:
         numbers = mdp.choice_to_action
     offsets, block = pack_strings(actions)
-    files["actions/choices/values.bin"] = _plain(numbers, "<u4")
+    files["actions/choices/values.bin"] = Numbers(numbers, "<u4")
     files["actions/choices/string-mapping.bin"] = _words(offsets)
     files["actions/choices/strings.bin"] = block.tobytes()
     return len(actions)
@@ -166,7 +145,7 @@ def _identifiers(names: Iterable[str]) -> dict[str, str]:
     return identifiers
 
 
-def _add_labels(labels: dict[str, Bools], files: dict[str, bytes | memoryview]) -> dict[str, Any]:
+def _add_labels(labels: dict[str, Bools], files: dict[str, bytes | Numbers]) -> dict[str, Any]:
     table = {}
     for name, identifier in _identifiers(labels).items():
         files[f"annotations/aps/{identifier}/states/values.bin"] = _bits(labels[name])
@@ -174,22 +153,20 @@ def _add_labels(labels: dict[str, Bools], files: dict[str, bytes | memoryview]) 
     return table
 
 
-def _add_rewards(mdp: MDP, files: dict[str, bytes | memoryview]) -> dict[str, Any]:
+def _add_rewards(mdp: MDP, files: dict[str, bytes | Numbers]) -> dict[str, Any]:
     table = {}
     for name, identifier in _identifiers(mdp.rewards).items():
         applies = []
         for part, values in mdp.rewards[name].parts():
             entity = {"state": "states", "choice": "choices", "branch": "branches"}[part]
-            files[f"annotations/rewards/{identifier}/{entity}/values.bin"] = _plain(values, "<f8")
+            files[f"annotations/rewards/{identifier}/{entity}/values.bin"] = Numbers(values, "<f8")
             applies.append(entity)
         kind = {"type": "double", "size": 64}
         table[identifier] = {"alias": name, "applies-to": applies or ["states"], "type": kind}
     return table
 
 
-def _add_variables(
-    mdp: MDP, files: dict[str, bytes | memoryview]
-) -> tuple[dict[str, Any] | None, dict[str, list[str]]]:
+def _add_variables(mdp: MDP, files: dict[str, bytes | Numbers]) -> tuple[dict[str, Any] | None, dict[str, list[str]]]:
     """Add the state variables; return their description, and what the numbers of those that are text stand for."""
     if mdp.names.strings is not None or not mdp.names.variables:
         return None, {}

@@ -1,27 +1,22 @@
 """Arrays of a graph enter, marks and numbers of states leave: the loops that numpy cannot do in one stroke.
 
-Every kernel is a plain function over arrays. `compiled` hands it out as it stands for little work (numba is then never
-imported) and compiled for much. ``RATHERTHAN_COMPILE`` is ``auto`` (default), ``always`` or ``never``;
-``NUMBA_DISABLE_JIT=1`` means never, too. Compiled code is kept in ``NUMBA_CACHE_DIR``, by default in the user's cache.
+Every kernel is a plain function over arrays. `compiled` hands it out as it stands for little work and as machine code for much,
+see `ratherthan.model.compiling`.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from functools import cache
-from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
-
 import numpy as np
 import numpy.typing as npt
 
+from ratherthan.model.compiling import LEAST_WORK, compiled, is_compiled
 from ratherthan.model.mdp import Bools, Ints
 
 __all__ = [
     "LEAST_WORK",
     "compiled",
-    "dominator_order",
+    "end_components_of",
+    "entering_choices",
     "is_compiled",
     "reversed_rows",
     "sorted_by",
@@ -33,56 +28,6 @@ __all__ = [
 
 Numbers = npt.NDArray[np.int32]
 Offsets = npt.NDArray[np.int64]
-P = ParamSpec("P")
-R = TypeVar("R")
-
-LEAST_WORK = 15_000
-"""From how many branches on a kernel is compiled; below, the plain loop is faster than loading the compiler."""
-
-
-def compiled(kernel: Callable[P, R], work: int) -> Callable[P, R]:
-    """Return `kernel`, compiled if `work` (about the number of branches) is worth it."""
-    return _jitted(kernel) if is_compiled(work) else kernel
-
-
-def is_compiled(work: int) -> bool:
-    """Return whether kernels are compiled for that much work."""
-    wish = os.environ.get("RATHERTHAN_COMPILE", "auto")
-    if wish == "never" or os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
-        return False
-    return wish == "always" or work >= LEAST_WORK
-
-
-@cache
-def _jitted(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the compiled kernel; what was compiled is kept on disk where the user may write."""
-    keep = _cache_folder()
-    import numba
-
-    if keep is not None and not numba.config.CACHE_DIR:
-        numba.config.CACHE_DIR = keep
-    compiled_kernel: Callable[..., Any] = numba.njit(cache=keep is not None, nogil=True)(kernel)
-    return compiled_kernel
-
-
-@cache
-def _cache_folder() -> str | None:
-    """Return the folder for compiled code, None where none can be written."""
-    given = os.environ.get("NUMBA_CACHE_DIR")
-    if given:
-        return given
-    from platformdirs import user_cache_path
-
-    folder = user_cache_path("ratherthan") / "compiled"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = Path(folder, f".probe-{os.getpid()}")
-        probe.touch()
-        probe.unlink()
-    except OSError:
-        return None
-    os.environ["NUMBA_CACHE_DIR"] = str(folder)
-    return str(folder)
 
 
 def spread_any(
@@ -130,6 +75,158 @@ def spread_all(
                     queue[filled] = before
                     filled += 1
     return filled
+
+
+def end_components_of(
+    rows: tuple[Ints, Ints, Ints],
+    back: tuple[Ints, Ints, Ints],
+    usable: Bools,
+    remaining: Ints,
+    members: Ints,
+    component: Ints,
+) -> int:
+    """Number the maximal end components of the `usable` choices from 0 on; returns how many there are.
+
+    `rows` are state_to_choices, choice_to_branches and branch_to_target, `back` are choice_to_state, entering_from and entering;
+    `remaining` counts the usable choices of each state, `members` lists the states that have one, and usable choices lead to such
+    states only. `component` is -1 everywhere. Usable leave those with which a run stays.
+
+    A part of the members that no usable choice leaves is split into its strong components (Tarjan, without recursion). Choices
+    between these are struck, and states that have no other. A component that lost nothing is an end component; of one that did,
+    what is left is a part to be split. So what was struck from a component is no matter to the others.
+    """
+    state_to_choices, choice_to_branches, branch_to_target = rows
+    choice_to_state, entering_from, entering = back
+    states, kind = len(component), entering.dtype
+    part = np.full(states, -1, kind)  # where the part of each state begins in `members`
+    found = np.zeros(states, kind)  # where its strong component will begin
+    order = np.zeros(states, kind)  # when it was first seen, from 1; 0: not yet; -1: its component is known
+    low = np.zeros(states, kind)
+    next_choice = np.zeros(states, kind)
+    next_branch = np.zeros(states, kind)
+    count = len(members)
+    waiting = np.zeros(count, kind)  # Tarjan's stack
+    path = np.zeros(count, kind)
+    split = np.zeros(count, kind)  # the members by component
+    struck = np.zeros(count + 1, np.bool_)  # by where a component begins: whether it lost something
+    ends = np.zeros(count + 1, kind)  # by where a part begins: where it ends
+    parts = np.zeros(count + 1, kind)  # the parts to be split
+    for i in range(count):
+        part[members[i]] = 0
+    ends[0] = count
+    todo = 1 if count > 0 else 0
+    number = 0
+    while todo > 0:
+        todo -= 1
+        begin = parts[todo]
+        end = ends[begin]
+        for i in range(begin, end):
+            order[members[i]] = 0
+        filled, seen, waits = begin, 0, 0
+        for i in range(begin, end):
+            root = members[i]
+            if order[root] != 0:
+                continue
+            seen += 1
+            order[root] = low[root] = seen
+            waiting[waits] = root
+            waits += 1
+            next_choice[root] = state_to_choices[root]
+            next_branch[root] = -1
+            path[0] = root
+            depth = 0
+            while depth >= 0:
+                state = path[depth]
+                choice = next_choice[state]
+                if choice < state_to_choices[state + 1]:
+                    branch = next_branch[state]
+                    if branch == -1:
+                        branch = choice_to_branches[choice]
+                    if not usable[choice] or branch >= choice_to_branches[choice + 1]:
+                        next_choice[state] = choice + 1
+                        next_branch[state] = -1
+                        continue
+                    next_branch[state] = branch + 1
+                    after = branch_to_target[branch]
+                    if order[after] == 0:
+                        seen += 1
+                        order[after] = low[after] = seen
+                        waiting[waits] = after
+                        waits += 1
+                        next_choice[after] = state_to_choices[after]
+                        next_branch[after] = -1
+                        depth += 1
+                        path[depth] = after
+                    elif 0 < order[after] < low[state]:
+                        low[state] = order[after]
+                    continue
+                if low[state] == order[state]:
+                    first = filled
+                    while True:
+                        waits -= 1
+                        member = waiting[waits]
+                        order[member] = -1
+                        found[member] = first
+                        split[filled] = member
+                        filled += 1
+                        if member == state:
+                            break
+                    ends[first] = filled
+                    struck[first] = False
+                depth -= 1
+                if depth >= 0 and low[state] < low[path[depth]]:
+                    low[path[depth]] = low[state]
+        dead = 0  # `waiting` is empty again and serves as a queue of the states that are left without a choice
+        for i in range(begin, end):
+            member = split[i]
+            members[i] = member
+            part[member] = found[member]
+        for i in range(begin, end):
+            member = members[i]
+            for choice in range(state_to_choices[member], state_to_choices[member + 1]):
+                if not usable[choice]:
+                    continue
+                for branch in range(choice_to_branches[choice], choice_to_branches[choice + 1]):
+                    if part[branch_to_target[branch]] != part[member]:
+                        usable[choice] = False
+                        struck[part[member]] = True
+                        remaining[member] -= 1
+                        if remaining[member] == 0:
+                            waiting[dead] = member
+                            dead += 1
+                        break
+        head = 0
+        while head < dead:
+            state = waiting[head]
+            head += 1
+            for i in range(entering_from[state], entering_from[state + 1]):
+                choice = entering[i]
+                if usable[choice]:
+                    usable[choice] = False
+                    before = choice_to_state[choice]
+                    struck[part[before]] = True
+                    remaining[before] -= 1
+                    if remaining[before] == 0:
+                        waiting[dead] = before
+                        dead += 1
+        first = begin
+        while first < end:
+            last, kept = ends[first], first
+            if not struck[first]:
+                for i in range(first, last):
+                    component[members[i]] = number
+                number += 1
+            else:
+                for i in range(first, last):
+                    if remaining[members[i]] > 0:
+                        members[kept] = members[i]
+                        kept += 1
+                if kept > first:
+                    ends[first] = kept
+                    parts[todo] = first
+                    todo += 1
+            first = last
+    return number
 
 
 def strong_components(
@@ -224,6 +321,24 @@ def sorted_by(target: Ints, value: Ints, count: int) -> tuple[Offsets, Ints]:
     return begin, values
 
 
+def entering_choices(choice_to_branches: Ints, branch_to_target: Ints, states: int) -> tuple[Ints, Ints]:
+    """Return the choices by where they lead, ascending for each state, and where each state's begin: by counting."""
+    begin = np.zeros(
+        states + 2, choice_to_branches.dtype
+    )  # one place further on, so that counting up leaves it as it is wanted
+    for b in range(len(branch_to_target)):
+        begin[branch_to_target[b] + 2] += 1
+    for s in range(2, states + 2):
+        begin[s] += begin[s - 1]
+    choices = np.empty(len(branch_to_target), choice_to_branches.dtype)
+    for c in range(len(choice_to_branches) - 1):
+        for b in range(choice_to_branches[c], choice_to_branches[c + 1]):
+            t = branch_to_target[b] + 1
+            choices[begin[t]] = c
+            begin[t] += 1
+    return begin[: states + 1], choices
+
+
 def reversed_rows(leaving_from: Offsets, leaving: Numbers) -> tuple[Offsets, Numbers]:
     """Return the edges of a graph in compressed rows turned round, by counting."""
     states = len(leaving_from) - 1
@@ -240,94 +355,6 @@ def reversed_rows(leaving_from: Offsets, leaving: Numbers) -> tuple[Offsets, Num
             entering[free[t]] = s
             free[t] += 1
     return entering_from, entering
-
-
-def dominator_order(
-    leaving_from: Offsets, leaving: Numbers, entering_from: Offsets, entering: Numbers, root: int
-) -> tuple[Numbers, Numbers, Numbers]:
-    """Number the states that `root` leads to in preorder of their dominator tree (Semi-NCA).
-
-    Returns the position of every state (-1 where `root` does not lead), the size of its subtree, and the states in order.
-    All work arrays are in the numbers of a depth-first search, in which dominators come before what they dominate.
-    """
-    states = len(leaving_from) - 1
-    number = np.full(states, -1, np.int32)
-    vertex = np.zeros(states, np.int32)
-    parent = np.zeros(states, np.int32)
-    path = np.zeros(states, np.int32)
-    onward = leaving_from[:-1].copy()
-    number[root] = 0
-    vertex[0] = root
-    path[0] = root
-    found, depth = 1, 0
-    while depth >= 0:
-        s = path[depth]
-        i = onward[s]
-        if i == leaving_from[s + 1]:
-            depth -= 1
-            continue
-        onward[s] = i + 1
-        t = leaving[i]
-        if number[t] < 0:
-            number[t] = found
-            vertex[found] = t
-            parent[found] = number[s]
-            found += 1
-            depth += 1
-            path[depth] = t
-    semi = np.arange(found).astype(np.int32)
-    label = np.arange(found).astype(np.int32)
-    above = parent[:found].copy()
-    for k in range(1, found):
-        w = found - k
-        least = parent[w]
-        v = vertex[w]
-        for i in range(entering_from[v], entering_from[v + 1]):
-            u = number[entering[i]]
-            if u < 0:
-                continue
-            if u > w:  # linked already: the least semidominator on the way up, with compression
-                depth = 0
-                x = u
-                while above[x] > w:
-                    path[depth] = x
-                    depth += 1
-                    x = above[x]
-                while depth > 0:
-                    depth -= 1
-                    x = path[depth]
-                    y = above[x]
-                    if semi[label[y]] < semi[label[x]]:
-                        label[x] = label[y]
-                    above[x] = above[y]
-                u = semi[label[u]]
-            least = min(least, u)
-        semi[w] = least
-    idom = parent[:found].copy()
-    size = np.ones(found, np.int32)
-    for w in range(1, found):
-        x = idom[w]
-        while x > semi[w]:
-            x = idom[x]
-        idom[w] = x
-    for k in range(1, found):
-        w = found - k
-        size[idom[w]] += size[w]
-    free = np.ones(found, np.int32)  # the next free position in each subtree
-    place = np.zeros(found, np.int32)
-    position = np.full(states, -1, np.int32)
-    extent = np.zeros(states, np.int32)
-    order = np.zeros(found, np.int32)
-    for w in range(found):
-        if w > 0:
-            place[w] = free[idom[w]]
-            free[idom[w]] += size[w]
-            free[w] = place[w] + 1
-        s = vertex[w]
-        position[s] = place[w]
-        extent[s] = size[w]
-        order[place[w]] = s
-    return position, extent, order
 
 
 def unfold(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 __all__ = ["Fault", "faults_of", "normalised", "shape_faults"]
 
 MOST_FAULTS = 20
+BLOCK = 1 << 15
+"""How many rows are summed at a time."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,6 +105,8 @@ def _offset_faults(name: str, offsets: npt.NDArray[Any], row: str, entry: str) -
         return [Fault(sentence=f"A model must have at least one {row}: {name} must have two entries or more.")]
     if offsets[0] != 0:
         return [Fault(sentence=f"{name} must begin at 0, got {offsets[0]}.")]
+    if (offsets[1:] > offsets[:-1]).all():
+        return []
     steps = offsets[1:].astype(np.int64) - offsets[:-1].astype(np.int64)
     faults = [
         Fault(sentence=f"{name} must not fall, but it does after {row} {row_}.", place={row: row_})
@@ -123,9 +128,8 @@ def normalised(mdp: MDP) -> dict[str, Any]:
     probability = np.asarray(mdp.branch_to_probability, dtype=np.float64)
     rows, target = np.asarray(mdp.choice_to_branches), np.asarray(mdp.branch_to_target)
     rewards = dict(mdp.rewards)
-    zero = probability == 0.0
-    if zero.any():
-        keep = ~zero
+    if not probability.all():
+        keep = probability != 0.0
         before = np.concatenate([[0], np.cumsum(keep)])
         kept_rows = before[rows]
         if (np.diff(kept_rows) > 0).all():
@@ -162,16 +166,36 @@ def _keep_branches(reward: Any, keep: npt.NDArray[np.bool_]) -> Any:
 def _rescaled(rows: npt.NDArray[Any], probability: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     from ratherthan.model.mdp import SUM_TOLERANCE
 
-    if not np.isfinite(probability).all():
+    if not _between(probability, -np.finfo(np.float64).max, np.finfo(np.float64).max):
         return probability
-    sums = np.add.reduceat(probability, rows[:-1])
-    counts = np.diff(rows)
-    off = np.abs(sums - 1.0)
-    to_mend = (off > 2.3e-16 * (counts + 4)) & (off <= SUM_TOLERANCE)
-    if not to_mend.any():
-        return probability
-    rescaled: npt.NDArray[np.float64] = probability / np.repeat(np.where(to_mend, sums, 1.0), counts)
+    rescaled = probability
+    for block, sums in _sums(rows, probability):
+        off = np.abs(sums - 1.0)
+        if not (off > 2.3e-16 * 5).any():  # a row has a branch at least
+            continue
+        counts = np.diff(rows[block.start : block.stop + 1])
+        to_mend = (off > 2.3e-16 * (counts + 4)) & (off <= SUM_TOLERANCE)
+        if to_mend.any():
+            rescaled = probability.copy() if rescaled is probability else rescaled
+            rescaled[rows[block.start] : rows[block.stop]] /= np.repeat(np.where(to_mend, sums, 1.0), counts)
     return rescaled
+
+
+def _sums(
+    rows: npt.NDArray[Any], probability: npt.NDArray[np.float64]
+) -> Iterator[tuple[slice, npt.NDArray[np.float64]]]:
+    """Yield the sums of the rows, some thousands at a time, which stay in the processor's cache: which rows, and their sums."""
+    count = len(rows) - 1
+    for first in range(0, count, BLOCK):
+        last = min(first + BLOCK, count)
+        begin = rows[first]
+        yield slice(first, last), np.add.reduceat(probability[begin : rows[last]], rows[first:last] - begin)
+
+
+def _between(values: npt.NDArray[Any], least: float, most: float) -> bool:
+    """Return whether all values lie between two numbers, both allowed; NaN does not. No array is made for it."""
+    with np.errstate(invalid="ignore"):
+        return len(values) == 0 or bool(values.min() >= least and values.max() <= most)
 
 
 def _locked(array: npt.NDArray[Any], dtype: Any) -> npt.NDArray[Any]:
@@ -236,6 +260,8 @@ def _choice_of_branch(mdp: MDP, branch: int) -> int:
 
 
 def _target_faults(mdp: MDP) -> list[Fault]:
+    if _between(mdp.branch_to_target, 0, mdp.states - 1):
+        return []
     wrong = np.flatnonzero((mdp.branch_to_target < 0) | (mdp.branch_to_target >= mdp.states))[:MOST_FAULTS]
     return [
         Fault(
@@ -251,7 +277,9 @@ def _probability_faults(mdp: MDP) -> list[Fault]:
     from ratherthan.model.mdp import SUM_TOLERANCE
 
     probability = mdp.branch_to_probability
-    wrong = np.flatnonzero(~((probability >= 0.0) & (probability <= 1.0 + SUM_TOLERANCE)))[:MOST_FAULTS]
+    wrong: Any = ()
+    if not _between(probability, 0.0, 1.0 + SUM_TOLERANCE):
+        wrong = np.flatnonzero(~((probability >= 0.0) & (probability <= 1.0 + SUM_TOLERANCE)))[:MOST_FAULTS]
     faults = [
         Fault(
             sentence=f"Probabilities must lie between 0 and 1, got {probability[b]:g} "
@@ -262,17 +290,20 @@ def _probability_faults(mdp: MDP) -> list[Fault]:
     ]
     if faults:
         return faults
-    sums = np.add.reduceat(probability, mdp.choice_to_branches[:-1])
-    return [
-        Fault(
-            sentence=f"Probabilities of a choice must sum to 1, got {sums[c]:.10g} {_where(mdp, int(c))}.",
-            place=_place(mdp, int(c)),
-        )
-        for c in np.flatnonzero(np.abs(sums - 1.0) > SUM_TOLERANCE)[:MOST_FAULTS]
-    ]
+    for block, sums in _sums(mdp.choice_to_branches, probability):
+        faults += [
+            Fault(
+                sentence=f"Probabilities of a choice must sum to 1, got {sums[c]:.10g} {_where(mdp, block.start + int(c))}.",
+                place=_place(mdp, block.start + int(c)),
+            )
+            for c in np.flatnonzero(np.abs(sums - 1.0) > SUM_TOLERANCE)[:MOST_FAULTS]
+        ]
+    return faults[:MOST_FAULTS]
 
 
 def _action_faults(mdp: MDP) -> list[Fault]:
+    if _between(mdp.choice_to_action, -1, len(mdp.actions) - 1):
+        return []
     wrong = np.flatnonzero((mdp.choice_to_action < -1) | (mdp.choice_to_action >= len(mdp.actions)))[:MOST_FAULTS]
     return [
         Fault(
@@ -298,6 +329,8 @@ def _reward_faults(mdp: MDP) -> list[Fault]:
                         place=place,
                     )
                 )
+                continue
+            if _between(values, -np.finfo(np.float64).max, np.finfo(np.float64).max):
                 continue
             faults += [
                 Fault(

@@ -13,7 +13,8 @@ branches does:
 
 An *end component* is a set of states with choices that never leave it and connect it strongly: what a policy can stay in
 for ever (de Alfaro 1997). The maximal ones are disjoint. They are found by taking strong components and dropping
-choices that leave theirs, again and again, each time only in the components that lost something.
+choices that leave theirs, again and again, each time only in the components that lost something; that takes time in proportion to the
+branches of what is split, so that only components which lose a little many times over cost more than one search.
 
 References
 ----------
@@ -24,16 +25,17 @@ R. Tarjan, Depth-First Search and Linear Graph Algorithms, SIAM J. Comput. 1(2),
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ratherthan.model._kernels import compiled, spread_all, spread_any, strong_components
-from ratherthan.model.index import Index
+from ratherthan.model._kernels import compiled, end_components_of, spread_all, spread_any
+from ratherthan.model.index import Index, branches_of
 from ratherthan.model.mdp import Bools, Ints
 
 __all__ = [
+    "Sure",
     "all_branches_in",
     "any_branch_in",
     "any_branch_in_rows",
@@ -46,9 +48,24 @@ __all__ = [
     "levels_to",
     "reached_from",
     "surely_reach",
+    "surely_reaching",
+    "way_back",
 ]
 
 Levels = npt.NDArray[np.int64]
+
+FEW = 8
+"""Of so many states, one is few: what enters few states is gathered, what enters many is marked."""
+
+
+class Sure(NamedTuple):
+    """From where a goal can be reached with probability 1, and what is found on the way to that."""
+
+    states: Bools  # [S], Pmax = 1
+    possible: Bools  # [S], Pmax > 0
+    usable: Bools  # [C], the permitted choices of `states` that are no goals, with which a run stays among `states`
+    level: Ints  # [S], how many steps the goal is away along such choices; below 0 outside `states`
+    order: Ints  # `states`, the nearest first
 
 
 def any_branch_in(index: Index, states: Bools) -> Bools:
@@ -99,15 +116,50 @@ def levels_to(index: Index, targets: Bools, inside: Bools, allowed: Bools | None
     array of int64, ``[S]``
         0 at targets, -1 where none can be reached.
     """
-    level = np.where(inside, -1, -2)
-    level[targets] = 0
-    queue = np.zeros(index.states, dtype=np.int64)
-    start = np.flatnonzero(targets)
-    queue[: len(start)] = start
     usable = np.ones(index.choices, dtype=np.bool_) if allowed is None else allowed
+    level = _spread(index, (targets, np.flatnonzero(targets)), inside, usable)[0]
+    return np.maximum(level, -1).astype(np.int64)
+
+
+def _spread(
+    index: Index, targets: tuple[Bools, npt.NDArray[np.int64]], inside: Bools, usable: Bools
+) -> tuple[Ints, Ints]:
+    """Return the level of every state, below 0 where it is not reached, and the states met, the nearest first.
+
+    `targets` has level 0, all of it; and those of it, by number, from which the search begins.
+    """
+    width, (marked, start) = index.entering.dtype, targets
+    level: Any = np.full(index.states, -2, dtype=width)
+    level[inside] = -1
+    level[marked] = 0
+    queue: Any = np.empty(index.states, dtype=width)
+    queue[: len(start)] = start
     kernel = compiled(spread_any, index.work)
-    kernel(index.entering_from, index.entering, index.choice_to_state, usable, level, queue, len(start))
-    return np.maximum(level, -1)
+    filled = kernel(index.entering_from, index.entering, index.choice_to_state, usable, level, queue, len(start))
+    return level, queue[:filled]
+
+
+def way_back(index: Index, states: Bools, inside: Bools) -> Levels:
+    """Return ``[S]``: the first listed choice of each state of `inside` that leads nearer to `states`; -1 elsewhere.
+
+    Levels and choices are those of `levels_to` and `first_downhill`. Only the states outside `states` are looked at: it takes no
+    time to speak of where these are few.
+    """
+    down = np.full(index.states, -1, dtype=np.int64)
+    outside = np.flatnonzero(inside & ~states)
+    if not len(outside):
+        return down
+    choices, _ = branches_of(index.state_to_choices, outside)
+    branches, offsets = branches_of(index.choice_to_branches, choices)
+    after = index.branch_to_target[branches]
+    border = np.unique(after[states[after]]).astype(np.int64)
+    every = np.ones(index.choices, dtype=np.bool_)
+    level, _ = _spread(index, (states, border), inside & ~states, every)
+    own = np.repeat(choices, np.diff(offsets))
+    nearer = (level[after] >= 0) & (level[after] < level[index.choice_to_state[own]])
+    heading = own[nearer][::-1]
+    down[index.choice_to_state[heading]] = heading  # the last assignment, that of the first listed choice, stands
+    return down
 
 
 def can_reach(index: Index, goal: Bools, inside: Bools, allowed: Bools | None = None) -> Bools:
@@ -125,16 +177,47 @@ def surely_reach(index: Index, goal: Bools, inside: Bools, allowed: Bools | None
     allowed : array of bool, ``[C]``, optional
         The choices that may be used; all by default.
     """
-    usable = np.ones(index.choices, dtype=np.bool_) if allowed is None else allowed.copy()
-    usable &= (inside & ~goal)[index.choice_to_state]
-    staying = goal | inside
-    lost = ~staying
-    while True:
-        staying &= ~_lose(index, lost, usable, staying & ~goal)
-        reached = can_reach(index, goal, staying, usable)
-        lost = staying & ~reached
-        if not lost.any():
-            return staying
+    return surely_reaching(index, goal, inside, allowed).states
+
+
+def surely_reaching(index: Index, goal: Bools, inside: Bools, allowed: Bools | None = None) -> Sure:
+    """Return the same as `surely_reach` with what was found on the way.
+
+    States that cannot reach the goal are struck, with all choices that may enter them and the states that have no other, and the
+    goal is searched for again. Where no choice of a state that is left enters what was struck, as on maps, one search was enough.
+    """
+    usable = (inside & ~goal)[index.choice_to_state]
+    if allowed is not None:
+        usable &= allowed
+    start = np.flatnonzero(goal)
+    level, order = _spread(index, (goal, start), inside, usable)
+    staying = possible = level >= 0
+    lost = ~possible
+    while lost.any() and _entered(index, lost, usable, staying):
+        staying = staying & ~_lose(index, lost, usable, staying & ~goal)
+        level, order = _spread(index, (goal, start), staying & ~goal, usable)
+        lost = staying & (level < 0)
+        staying = staying & ~lost
+    usable &= staying[index.choice_to_state]
+    return Sure(staying, possible, usable, level, order)
+
+
+def _entered(index: Index, lost: Bools, usable: Bools, staying: Bools) -> bool:
+    """Return whether a usable choice of a state that stays may enter a lost one."""
+    states = np.flatnonzero(lost)
+    if FEW * len(states) > index.states:
+        return bool((any_branch_in(index, lost) & usable & staying[index.choice_to_state]).any())
+    places, _ = branches_of(index.entering_from, states)
+    choices = index.entering[places]
+    return bool((usable[choices] & staying[index.choice_to_state[choices]]).any())
+
+
+def _counts(index: Index, choices: Bools) -> Ints:
+    """Return ``[S]``: how many of `choices` each state has."""
+    before: Any = np.zeros(index.choices + 1, dtype=index.entering.dtype)
+    np.cumsum(choices, out=before[1:])
+    counts: Ints = before[index.state_to_choices[1:]] - before[index.state_to_choices[:-1]]
+    return counts
 
 
 def _lose(index: Index, lost: Bools, usable: Bools, inside: Bools) -> Bools:
@@ -142,10 +225,10 @@ def _lose(index: Index, lost: Bools, usable: Bools, inside: Bools) -> Bools:
 
     Returns ``[S]``: the lost states and those of `inside` that are lost with them.
     """
-    remaining = np.bincount(index.choice_to_state[usable], minlength=index.states)
+    remaining = _counts(index, usable)
     bare = inside & (remaining == 0)
     start = np.flatnonzero(lost | bare)
-    queue = np.zeros(index.states, dtype=np.int64)
+    queue: Any = np.empty(index.states, dtype=index.entering.dtype)
     queue[: len(start)] = start
     remaining[start] = -1
     kernel = compiled(spread_all, index.work)
@@ -179,13 +262,14 @@ def reached_from(index: Index, start: Bools, ended: Bools, allowed: Bools | None
     edges: Any = np.arange(len(target)).astype(index.entering.dtype)
     for array in (leaving_from, edges, target):
         array.flags.writeable = False  # like the arrays of an Index: one compiled kernel serves both
-    level = np.where(start, 0, -1)
-    queue = np.zeros(index.states, dtype=np.int64)
+    level: Any = np.where(start, 0, -1).astype(index.entering.dtype)
+    queue: Any = np.empty(index.states, dtype=index.entering.dtype)
     first = np.flatnonzero(start)
     queue[: len(first)] = first
     kernel = compiled(spread_any, index.work)
     kernel(leaving_from, edges, target, np.ones(len(target), dtype=np.bool_), level, queue, len(first))
-    return level >= 0
+    reached: Bools = level >= 0
+    return reached
 
 
 def end_components(index: Index, inside: Bools, allowed: Bools) -> tuple[Levels, Bools]:
@@ -199,37 +283,15 @@ def end_components(index: Index, inside: Bools, allowed: Bools) -> tuple[Levels,
         The allowed choices with which a run stays in the component of its state.
     """
     usable = allowed & inside[index.choice_to_state]
-    alive = inside.copy()
-    alive &= ~_lose(index, ~alive, usable, alive)
-    component = np.full(index.states, -1, dtype=np.int64)
-    number = 0
-    roots = np.flatnonzero(alive)
-    kernel = compiled(strong_components, index.work)
-    while len(roots):
-        number = kernel(
-            index.state_to_choices, index.choice_to_branches, index.branch_to_target,
-            usable, roots, alive, component, number,
-        )  # fmt: skip
-        touched = _drop_crossing(index, component, usable, alive)
-        roots = np.flatnonzero(touched & alive)
-        component[touched] = -1
-    component[~alive] = -1
+    component: Any = np.full(index.states, -1, dtype=np.int64)
+    if not usable.any():
+        return component, usable
+    alive = inside & ~_lose(index, ~inside, usable, inside)
+    members: Any = np.flatnonzero(alive).astype(index.entering.dtype)
+    kernel = compiled(end_components_of, index.work)
+    kernel(
+        (index.state_to_choices, index.choice_to_branches, index.branch_to_target),
+        (index.choice_to_state, index.entering_from, index.entering),
+        usable, _counts(index, usable), members, component,
+    )  # fmt: skip
     return component, usable
-
-
-def _drop_crossing(index: Index, component: Levels, usable: Bools, alive: Bools) -> Bools:
-    """Strike usable choices that leave their component, and states left bare; return the states of components touched."""
-    target = component[index.branch_to_target]
-    leaves = target != component[index.choice_to_state[index.branch_to_choice]]
-    crossing = usable & any_branch_in_rows(index, leaves & usable[index.branch_to_choice])
-    if not crossing.any():
-        return np.zeros(index.states, dtype=np.bool_)
-    usable &= ~crossing
-    before = usable.copy()
-    gone = _lose(index, ~alive, usable, alive) & alive
-    alive &= ~gone
-    struck = index.choice_to_state[crossing | (before & ~usable)]
-    hit = np.zeros(int(component.max()) + 1, dtype=np.bool_)
-    hit[component[struck]] = True
-    hit[component[gone]] = True
-    return (component >= 0) & hit[component]

@@ -1,24 +1,30 @@
 """The rows of a graph enter; their Index leaves: which choice a branch is of, which state a choice is of, what enters a state.
 
-It is built once for a model, in time and memory linear in the branches, and passed on.
+It is built once for a model, in time and memory linear in the branches, and passed on. What is as long as the branches is made
+when it is first asked for: not every question needs it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
-from ratherthan.model._kernels import compiled, is_compiled, sorted_by
+from ratherthan.model._kernels import compiled, entering_choices, is_compiled
 from ratherthan.model.mdp import MDP, Ints
+from ratherthan.model.watch import look, room_for
 
 __all__ = ["Index", "branches_of", "build_index", "index_of"]
 
-MANY = 1_000_000
+MANY = 30_000
 """From how many branches on sorting by counting is worth compiling it."""
+
+BYTES = 8
+"""What an index takes per branch."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,21 +37,44 @@ class Index:
         As in `MDP`.
     choice_to_state : array of int, ``[C]``
         The state of each choice.
-    branch_to_choice : array of int, ``[B]``
-        The choice of each branch.
-    entering_from : array of int, ``[S+1]``
-        The choices with a branch to state s are ``entering[entering_from[s]:entering_from[s+1]]``.
-    entering : array of int, ``[B]``
-        Those choices, ascending; a choice with two branches to a state is there twice.
     """
 
     state_to_choices: Ints  # [S+1]
     choice_to_branches: Ints  # [C+1]
     branch_to_target: Ints  # [B]
     choice_to_state: Ints  # [C]
-    branch_to_choice: Ints  # [B]
-    entering_from: Ints  # [S+1]
-    entering: Ints  # [B]
+
+    @cached_property
+    def branch_to_choice(self) -> Ints:
+        """The choice of each branch, ``[B]``."""
+        width = self.choice_to_state.dtype.type
+        return _locked(np.repeat(np.arange(self.choices, dtype=width), np.diff(self.choice_to_branches)), width)
+
+    @property
+    def entering_from(self) -> Ints:
+        """Where the choices with a branch to state s are among `entering`, ``[S+1]``: from s's number there up to the next."""
+        return self._reverse[0]
+
+    @property
+    def entering(self) -> Ints:
+        """The choices by where they lead, ``[B]``, ascending for each state; one with two branches to a state is there twice."""
+        return self._reverse[1]
+
+    @cached_property
+    def _reverse(self) -> tuple[Ints, Ints]:
+        width = self.choice_to_state.dtype.type
+        if self.work > MANY and is_compiled(self.work):
+            kernel = compiled(entering_choices, self.work)
+            begin, choices = kernel(self.choice_to_branches, self.branch_to_target, self.states)
+            return _locked(begin, width), _locked(choices, width)
+        counts = np.bincount(self.branch_to_target, minlength=self.states)
+        starts, order = np.concatenate([[0], np.cumsum(counts)]), np.argsort(self.branch_to_target, kind="stable")
+        return _locked(starts, width), _locked(self.branch_to_choice[order], width)
+
+    def forget(self) -> None:
+        """Give back the memory of what is made anew where it is asked for again."""
+        for name in ("_reverse", "branch_to_choice"):
+            self.__dict__.pop(name, None)
 
     @property
     def states(self) -> int:
@@ -90,27 +119,15 @@ def build_index(state_to_choices: Ints, choice_to_branches: Ints, branch_to_targ
     """
     states = len(state_to_choices) - 1
     width = _width(states, len(choice_to_branches) - 1, len(branch_to_target))
+    room_for(BYTES * len(branch_to_target), f"The index of a model of {len(branch_to_target)} branches")
+    look()
     choice_to_state = np.repeat(np.arange(states, dtype=width), np.diff(state_to_choices))
-    branch_to_choice = np.repeat(np.arange(len(choice_to_branches) - 1, dtype=width), np.diff(choice_to_branches))
-    entering_from, entering = _sorted_by(branch_to_target, branch_to_choice, states)
     return Index(
         state_to_choices=_locked(state_to_choices, width),
         choice_to_branches=_locked(choice_to_branches, width),
         branch_to_target=_locked(branch_to_target, width),
         choice_to_state=_locked(choice_to_state, width),
-        branch_to_choice=_locked(branch_to_choice, width),
-        entering_from=_locked(entering_from, width),
-        entering=_locked(entering, width),
     )
-
-
-def _sorted_by(target: Ints, value: npt.NDArray[Any], count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[Any]]:
-    """Return `value` sorted by `target`, and where each target's begin, ``[count+1]``."""
-    if len(target) > MANY and is_compiled(len(target)):
-        return compiled(sorted_by, len(target))(target, value, count)
-    begin = np.zeros(count + 1, dtype=np.int64)
-    np.cumsum(np.bincount(target, minlength=count), out=begin[1:])
-    return begin, value[np.argsort(target, kind="stable")]
 
 
 def _width(*counts: int) -> type[np.int32 | np.int64]:

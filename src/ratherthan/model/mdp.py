@@ -151,7 +151,7 @@ class MDP:
     def state_of(self, choice: int) -> int:
         """Return the state that a choice belongs to."""
         offset = self.state_to_choices.dtype.type(choice)  # of another width, the whole array would be converted
-        return int(np.searchsorted(self.state_to_choices, offset, side="right")) - 1
+        return int(self.state_to_choices.searchsorted(offset, side="right")) - 1
 
     def action_name(self, choice: int) -> str:
         """Return the shown name of a choice: its action's, else "choice k"; equal names in one state get " (2)", " (3)"."""

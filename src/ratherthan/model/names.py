@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import overload
+from typing import Protocol, overload, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from ratherthan.errors import ModelError, QuestionError
 
-__all__ = ["Columns", "Pairs", "StateNames", "spell"]
+__all__ = ["Columns", "Pairs", "Placing", "StateNames", "spell"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,7 +87,7 @@ class StateNames:
 
     def called(self, name: str) -> npt.NDArray[np.int64]:
         """Return the states that are called `name`, as `find` understands it."""
-        if isinstance(self.strings, Pairs):
+        if isinstance(self.strings, Finding):
             return self.strings.called(name)
         if self.strings is not None:
             return np.array([i for i, string in enumerate(self.strings) if string == name], dtype=np.int64)
@@ -108,6 +108,22 @@ class StateNames:
         if not self.named:
             return f"0 … {self.count - 1} (this model has no state names)"
         return ", ".join(f"'{self[i]}'" for i in range(min(3, self.count)))
+
+
+@runtime_checkable
+class Finding(Protocol):
+    """Names that find a state by themselves, without a look at each."""
+
+    def called(self, name: str) -> npt.NDArray[np.int64]:
+        """Return the states that are called `name`."""
+
+
+@runtime_checkable
+class Placing(Protocol):
+    """Names that know how the cells of a map are called, those without a state too."""
+
+    def of_cell(self, cell: int) -> str:
+        """Return how a cell is called."""
 
 
 class Pairs(Sequence[str]):

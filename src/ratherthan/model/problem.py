@@ -67,6 +67,8 @@ class Problem:
         What a reader should know: repairs made while reading, for instance.
     unfolding : Unfolding, optional
         Where the model is the product of another with what must be remembered.
+    lacks : str
+        What must still be given before anything can be wanted of it, in sentences; empty where nothing is missing.
     """
 
     mdp: MDP
@@ -79,3 +81,4 @@ class Problem:
     source: str = ""
     notes: tuple[str, ...] = ()
     unfolding: Unfolding | None = None
+    lacks: str = ""

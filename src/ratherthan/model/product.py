@@ -43,11 +43,15 @@ from ratherthan.model.policy import Policy, check_policy
 from ratherthan.model.problem import Problem, Unfolding
 from ratherthan.model.syntax import Term, text_of
 from ratherthan.model.valuation import deadlocks
+from ratherthan.model.watch import room_for
 
 __all__ = ["choices_of_origin", "lifted", "path_of", "unfolded"]
 
 MOST_BRANCHES = 30_000_000
 """The most branches of a product."""
+
+BYTES = 64
+"""What a product takes per branch while it is put together."""
 
 _Numbers = npt.NDArray[np.int64]
 
@@ -124,6 +128,7 @@ def _product(problem: Problem, mission: Mission, automaton: Automaton) -> Proble
             f"The model with what '{mission.formula}' must remember must have at most {MOST_BRANCHES} branches, but has "
             f"more: {mdp.branches} branches and {len(automaton.left)} things to remember. Take a smaller model or bound."
         )
+    room_for(BYTES * len(target), f"The model with what '{mission.formula}' must remember, of {len(target)} branches,")
     first = np.unique(class_of, return_index=True)[1]
     classes = class_of[np.sort(first)]  # in the order of their first appearance
     memory = np.empty(len(automaton.left), dtype=np.int64)

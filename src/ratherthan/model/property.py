@@ -257,7 +257,12 @@ def wish_of(problem: Problem, text: str | None = None, *, discount: float | None
         parts = _parts(text)
         if len(parts) > 1:
             return lexicographic([wish_of(problem, part, discount=discount) for part in parts])
-        return _parsed_or_named(problem.others.get(_bare(text), text), problem, discount)
+        try:
+            return _parsed_or_named(problem.others.get(_bare(text), text), problem, discount)
+        except PropertyError as error:
+            if not problem.lacks or isinstance(error, NotExplainableError):
+                raise
+            raise PropertyError(f"{error.message} {problem.lacks}", **error.place) from error
     if problem.objective is not None:
         return problem.objective
     if len(problem.properties) == 1:
@@ -291,6 +296,8 @@ def _parsed_or_named(text: str, problem: Problem, discount: float | None) -> Obj
 
 def _what_there_is(problem: Problem) -> str:
     """Say which properties, rewards and labels there are, with an example to copy."""
+    if problem.lacks:
+        return problem.lacks
     mdp = problem.mdp
     goals = [label for label in GOALS if label in mdp.labels] or list(mdp.labels) or ["init"]
     head = f'R{{"{next(iter(mdp.rewards))}"}}min' if mdp.rewards else "Pmax"

@@ -7,6 +7,7 @@ from typing import Any, NoReturn
 
 from ratherthan.errors import ExplanationError
 from ratherthan.explain.explanation import Explanation
+from ratherthan.narrate.indenting import Spelled, indented
 from ratherthan.narrate.narrate import narrate
 
 __all__ = ["from_json", "to_json"]
@@ -24,18 +25,13 @@ def to_json(explanation: Explanation) -> str:
     str
         Indented, with a line end; ``docs/schema/explanation.schema.json`` describes it.
     """
-    from ratherthan.explain.record import to_document
+    from ratherthan.explain.record import digest_of, frame_of
 
-    document = to_document(explanation, narrate(explanation))
-    rows = document["policy"]["choices"]
-    document["policy"] = document["policy"] | {"choices": []}
-    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
-    return text.replace('"choices": []', f'"choices": {_one_a_line(rows)}', 1) + "\n"
-
-
-def _one_a_line(rows: list[list[Any]]) -> str:
-    """Return the rows of a policy, which may be a million, each on a line of its own."""
-    return json.dumps(rows).replace("], [", "],\n      [") if rows else "[]"
+    document = frame_of(explanation, narrate(explanation))
+    document["digest"] = digest_of(explanation, document)
+    rows = explanation.policy.rows.spelled().replace(",", ", ").replace("], [", "],\n      [")
+    document["policy"]["choices"] = Spelled(rows)
+    return indented(document) + "\n"
 
 
 def from_json(text: str) -> Explanation:

@@ -51,9 +51,11 @@ def qualified(noun: str, adjective: str) -> str:
 
     Examples
     --------
-    >>> qualified("grid 10", "critical"), qualified("the crossing", "critical")
-    ('critical grid 10', 'the critical crossing')
+    >>> qualified("grid 10", "critical"), qualified("the crossing", "critical"), qualified("(1.2 m, 3 m)", "critical")
+    ('critical grid 10', 'the critical crossing', 'the critical point (1.2 m, 3 m)')
     """
+    if noun.startswith("("):
+        return f"the {adjective} point {noun}"
     article, _, rest = noun.partition(" ")
     if rest and article.lower() in ("the", "a", "an", "our", "your"):
         return f"{'a' if article.lower() == 'an' else article} {adjective} {rest}"

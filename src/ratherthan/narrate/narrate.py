@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ratherthan.explain.explanation import Explanation, Step
+from ratherthan.explain.telling import told_groups
 from ratherthan.model.lexicon import Lexicon
+from ratherthan.narrate.closed import no_way_through
 from ratherthan.narrate.contrast import contrast_reason
 from ratherthan.narrate.numbers import at_most, percent
 from ratherthan.narrate.reasons import details, reason
@@ -85,7 +87,7 @@ def _route_text(words: Vocabulary) -> str:
     if not explanation.steps:  # a policy that says nothing where it starts
         return str(words.table("route")["remain"].format(place=words.place(explanation.start)))
     selective = "selectiveness" in explanation.question.factors
-    told = [step for step in explanation.steps if not selective or step.critical is not False]
+    told = [explanation.steps[place] for group in told_groups(explanation) for place in group]
     sentences = _told(words, told, selective=selective)
     if selective:
         sentences += _closing(words, told)
@@ -209,6 +211,8 @@ def _no_way(words: Vocabulary) -> str:
     if explanation.in_the_way:
         places = words.places(explanation.in_the_way)
         return str(route["no_way_hazards"].format(arrive=arrive, place=place, places=places))
+    if explanation.openings:
+        return no_way_through(words)
     reached = [state for state in explanation.circle if state != explanation.start]
     if explanation.circle_size <= 1:
         return str(route["no_way_alone"].format(arrive=arrive, place=place))
@@ -228,7 +232,8 @@ def _circle(words: Vocabulary) -> str:
 
 def _goes_on(explanation: Explanation) -> bool:
     """Return whether the plan has something to do where it circles; else the objective has ended there, badly."""
-    return any(state in explanation.circle for state, _, _ in explanation.policy.choices)
+    listed = explanation.policy.rows.state
+    return any(bool((listed == state).any()) for state in explanation.circle)
 
 
 def _chances(words: Vocabulary) -> list[str]:

@@ -16,8 +16,10 @@ from ratherthan.model.mdp import Floats, Ints
 
 __all__ = [
     "Factors",
+    "Needs",
     "Ordered",
     "Rows",
+    "Swept",
     "backward_pass",
     "drift_rows",
     "eliminate",
@@ -26,11 +28,14 @@ __all__ = [
     "gather_rows",
     "mean_rows",
     "ordered_rows",
+    "scaling_needs",
     "sinks_first",
     "substitute",
     "sweep",
+    "swept_rows",
     "window_pass",
     "window_residual",
+    "window_sweeps",
 ]
 
 Ints64 = npt.NDArray[np.int64]
@@ -314,6 +319,198 @@ def window_residual(rows: Ordered, values: Floats) -> float:
             best = min(best, x)
         largest = max(largest, abs(best - values[s]))
     return largest
+
+
+class Swept(NamedTuple):
+    """Rows of a model in the order in which they are swept, and what is known of them."""
+
+    rows: Ordered
+    source: npt.NDArray[np.int32]  # [m], the choice of each row
+    longest: int  # branches of a row, loops included
+    least: float  # what a row pays, by step that leaves
+    largest: float
+    loops: bool  # whether there were any
+
+
+def swept_rows(
+    rows: tuple[Ints, Ints, Ints], probability: Floats, cost: Floats, order: Ints, rank: npt.NDArray[np.int32]
+) -> Swept:
+    """Return the rows of the states in `order` that may be taken, loops taken out and what is left scaled to sum to 1.
+
+    `rows` are state_to_choices, choice_to_branches and branch_to_target. `rank` is the place of each state in `order`, their number
+    at the goal, and below 0 at states that no row taken may lead to.
+    """
+    state_to_choices, choice_to_branches, branch_to_target = rows
+    n, m, k = len(order), 0, 0
+    for i in range(n):
+        first, last = state_to_choices[order[i]], state_to_choices[order[i] + 1]
+        m += last - first
+        k += choice_to_branches[last] - choice_to_branches[first]
+    node_to_rows = np.zeros(n + 1, np.int32)
+    row_to_branches = np.empty(m + 1, np.int32)
+    target = np.empty(k, np.int32)
+    chance = np.empty(k, np.float64)
+    paid = np.empty(m, np.float64)
+    source = np.empty(m, np.int32)
+    row_to_branches[0] = 0
+    row, branch, longest = 0, 0, 0
+    least, largest, loops = np.inf, 0.0, False
+    for i in range(n):
+        for c in range(state_to_choices[order[i]], state_to_choices[order[i] + 1]):
+            first, last, at = choice_to_branches[c], choice_to_branches[c + 1], branch
+            leave, inside = 0.0, True
+            for b in range(first, last):
+                t = rank[branch_to_target[b]]
+                if t < 0:
+                    inside = False
+                    break
+                if t != i:
+                    target[at] = t
+                    chance[at] = probability[b]
+                    leave += probability[b]
+                    at += 1
+            if not inside or at == branch:
+                continue
+            loops = loops or at - branch < last - first
+            longest = max(longest, last - first)
+            if at - branch < last - first or leave != 1.0:
+                for b in range(branch, at):
+                    chance[b] = chance[b] / leave
+            paid[row] = cost[c] / leave
+            least, largest = min(least, paid[row]), max(largest, paid[row])
+            source[row] = c
+            row, branch = row + 1, at
+            row_to_branches[row] = branch
+        node_to_rows[i + 1] = row
+    made = Ordered(node_to_rows, row_to_branches[: row + 1], target[:branch], chance[:branch], paid[:row])
+    return Swept(made, source[:row], longest, least, largest, loops)
+
+
+def window_sweeps(
+    rows: Ordered,
+    layers: Ints64,
+    values: Floats,
+    taken: npt.NDArray[np.int32],
+    at: Ints64,
+    spans: tuple[int, int],
+    wanted: tuple[float, float],
+    budget: int,
+) -> tuple[int, float]:
+    """Solve window after window, each until no sweep changes a value by more than a tolerance; or until a budget is spent.
+
+    `spans` are how many layers a window has, and how many it moves on; `wanted` are the tolerance and a step. A sweep that chooses is
+    followed by up to three that keep to what was chosen. `values` (those of the sinks behind them) and the row `taken` at each node
+    leave improved. A positive step says that there are no values yet: a node then begins with the least value of the nodes before it
+    that its first row leads to, and a step more. `at` is the layer of the window to begin with, and how many nodes have values; it
+    leaves as where to go on, the number of layers at the end. Returns how many nodes were visited, and the last change.
+    """
+    (width, stride), (tolerance, step) = spans, wanted
+    nodes, last = len(rows.node_to_rows) - 1, len(layers) - 1
+    spent, change = 0, np.inf
+    while at[0] < last and spent <= budget:
+        layer = at[0]
+        begin, end = layers[layer], layers[min(layer + width, last)]
+        if step > 0.0:
+            ahead = layers[min(layer + width + stride, last)]  # what the window looks at must have values, too
+            for s in range(at[1], ahead):
+                nearest = np.inf
+                first = rows.node_to_rows[s]
+                for b in range(rows.row_to_branches[first], rows.row_to_branches[first + 1]):
+                    t = rows.target[b]
+                    if (t < s or t >= nodes) and values[t] < nearest:
+                        nearest = values[t]
+                values[s] = step + (nearest if nearest < np.inf else values[max(s - 1, 0)])
+            at[1] = max(at[1], ahead)
+        keeping = 0  # how many sweeps more keep to what was chosen
+        while spent <= budget:
+            change = 0.0
+            if keeping > 0:
+                for s in range(begin, end):
+                    a = taken[s]
+                    x = rows.cost[a]
+                    for b in range(rows.row_to_branches[a], rows.row_to_branches[a + 1]):
+                        x += rows.probability[b] * values[rows.target[b]]
+                    change = max(change, abs(x - values[s]))
+                    values[s] = x
+                keeping = keeping - 1 if change > 0.5 * tolerance else 0
+                spent += end - begin
+                continue
+            for s in range(begin, end):
+                best = np.inf
+                for a in range(rows.node_to_rows[s], rows.node_to_rows[s + 1]):
+                    x = rows.cost[a]
+                    for b in range(rows.row_to_branches[a], rows.row_to_branches[a + 1]):
+                        x += rows.probability[b] * values[rows.target[b]]
+                    if x < best:
+                        best = x
+                        taken[s] = a
+                change = max(change, abs(best - values[s]))
+                values[s] = best
+            spent += end - begin
+            if not change > tolerance:
+                at[0] = last if layer + width >= last else layer + stride
+                break
+            keeping = 3
+    return spent, change
+
+
+class Needs(NamedTuple):
+    """By what share values must be made smaller, and larger, to be proved bounds; and the largest |Tv - v|."""
+
+    below: float
+    above: float
+    residual: float
+
+
+def scaling_needs(
+    rows: Ordered,
+    source: npt.NDArray[np.int32],
+    values: Floats,
+    limits: tuple[float, float],
+    tied: npt.NDArray[np.bool_],
+) -> Needs:
+    """Return what it takes to prove `values` ``[n + 2]`` by scaling; the choices that cannot be told from the best leave in `tied`.
+
+    With D the drift of the values along a row and e what it may be wrong by, (1 - h) v is a bound from below if h · cost ≥ e - D along
+    every row; (1 + h) v is one from above of the policy that takes the first tied row of each node if h · cost ≥ (1 + h) (D + e) along
+    its rows. `limits` are how far a tied row may be behind the best, and the relative error of a drift. Needs are infinite, or no
+    numbers, where nothing can be proved.
+    """
+    slack, unit = limits
+    n, most = len(rows.node_to_rows) - 1, 0
+    for s in range(n):
+        most = max(most, rows.node_to_rows[s + 1] - rows.node_to_rows[s])
+    drifts, errors = np.zeros(most), np.zeros(most)
+    below, above, residual = 0.0, 0.0, 0.0
+    for s in range(n):
+        first, own, best = rows.node_to_rows[s], values[s], np.inf
+        for a in range(first, rows.node_to_rows[s + 1]):
+            moved, size, wide = 0.0, rows.cost[a], 0.0
+            for b in range(rows.row_to_branches[a], rows.row_to_branches[a + 1]):
+                step = values[rows.target[b]] - own
+                share = rows.probability[b] * step
+                moved += share
+                size += abs(share)
+                wide += 1.0 + abs(step)
+            drift, error = rows.cost[a] + moved, unit * size + 1e-322 * wide
+            drifts[a - first], errors[a - first] = drift, error
+            best = min(best, drift)
+            need = (error - drift) / rows.cost[a]
+            if not need <= below:
+                below = need
+        residual = max(residual, abs(best))
+        choosing = True
+        for a in range(first, rows.node_to_rows[s + 1]):
+            near = drifts[a - first] - best <= slack + 4.0 * errors[a - first]
+            tied[source[a]] = near
+            if near and choosing:
+                choosing = False
+                need = (drifts[a - first] + errors[a - first]) / rows.cost[a]
+                if not need <= above:
+                    above = need
+        if choosing:
+            above = np.inf
+    return Needs(below, above, residual)
 
 
 def gather_rows(

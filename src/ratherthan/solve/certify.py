@@ -24,6 +24,9 @@ x ≥ E[cost of k steps] + E[x(Xₖ)] ≥ E[cost of k steps] + P[sink 1 within k
 never_rises over all rows proves x ≥ ρ for a largest value, and never_falls x ≤ ρ for a least, whatever the signs of x and of
 what is paid. So it is for discounted sums, where every policy is absorbed.
 
+*Probabilities of a model as they stand.* A check that fails is made again with drifts of some thirty digits (`trapped.exact`), of values
+and margin rounded to two doubles. Bounds are rounded outward by more than that (`outward`).
+
 The vectors to check are the solver's values and a margin below or above them, found in `margins` from linear solves. A
 vector that fails is tried again with a wider margin or given up, never reported.
 
@@ -44,6 +47,7 @@ from ratherthan.model.mdp import Floats
 from ratherthan.solve.linear import Inverse
 from ratherthan.solve.margins import margin_of
 from ratherthan.solve.system import System, certain_drift, drift
+from ratherthan.solve.trapped.exact import exact_drift, is_exact
 
 __all__ = [
     "Parts",
@@ -60,6 +64,8 @@ __all__ = [
 Nodes = npt.NDArray[np.int64]
 
 SCALES = (1.0, 16.0, 1024.0)
+MOST_PARTS = 3
+"""High and low part of values, and a margin."""
 
 
 class Parts(NamedTuple):
@@ -86,13 +92,22 @@ class Tight(NamedTuple):
 def never_falls(system: System, *parts: Floats) -> bool:
     """Return whether x, the sum of `parts`, provably satisfies x ≤ cost + P x along every row."""
     total, error = drift(system, *parts)
-    return bool((total - error >= 0.0).all())
+    return bool((total - error >= 0.0).all()) or _exactly(system, parts, 1.0)
 
 
 def never_rises(system: System, *parts: Floats) -> bool:
     """Return whether x, the sum of `parts`, provably satisfies x ≥ cost + P x along every row."""
     total, error = drift(system, *parts)
-    return bool((total + error <= 0.0).all())
+    return bool((total + error <= 0.0).all()) or _exactly(system, parts, -1.0)
+
+
+def _exactly(system: System, parts: tuple[Floats, ...], sign: float) -> bool:
+    """Return whether x passes the check with drifts in two parts, where these can be had: x is then `parts` rounded to two."""
+    if not is_exact(system) or len(parts) > MOST_PARTS:
+        return False
+    low = parts[1] if len(parts) > 1 else np.zeros(system.nodes)
+    total, error = exact_drift(system, parts[0], low + parts[2] if len(parts) == MOST_PARTS else low)
+    return bool((sign * total - error >= 0.0).all())
 
 
 def fits(system: System, values: Floats, sign: float) -> bool:

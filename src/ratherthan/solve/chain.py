@@ -30,6 +30,9 @@ from ratherthan.solve.rewards import SMALLEST
 from ratherthan.solve.sweeps import Sweeps, sweep_from_below, swept_between, upper_vector
 from ratherthan.solve.system import System, build_system
 
+SOME = 3000
+"""Up to how many states the equations of a chain are solved at once, and to the last digit."""
+
 __all__ = ["Chain", "Evaluated", "Guess", "chain_of", "evaluated", "nodes_of", "refuse_unsaid"]
 
 
@@ -47,6 +50,8 @@ class Chain:
         Where something is paid, and where that was not rounded.
     said : array of bool, ``[S]``
         Where the policy says something.
+    given : bool
+        Whether it takes one choice everywhere, so that its probabilities are those of the model as they stand.
     """
 
     index: Index
@@ -56,6 +61,7 @@ class Chain:
     costly: Bools  # [S]
     exact: Bools  # [S]
     said: Bools  # [S]
+    given: bool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,6 +105,7 @@ def chain_of(goal: Goal, policy: Policy) -> Chain:
         costly=costly,
         exact=np.bincount(state[goal.exact[taken] & (share == 1.0)], minlength=index.states) == 1,
         said=sums > 0.0,
+        given=bool((share == 1.0).all()),
     )
 
 
@@ -193,6 +200,7 @@ def _computed(
         exact=chain.exact,
         signed=goal.signed,
         discount=goal.discount,
+        given=chain.given,
     )
     least, most = _widest(goal, system.nodes)
     plain = layered_bounds(system, goal.maximise, most=np.inf if goal.counts_cost else 1.0)
@@ -206,14 +214,39 @@ def _computed(
             lower, upper = outward(parts, margin, signed=system.signed)
             lower, upper = np.maximum(lower, least), np.minimum(upper, most)
             return np.clip(parts.high + parts.low, lower, upper), lower, upper
+    at_size = _at_size(goal, system)
+    if at_size is not None:
+        return at_size[0], np.maximum(at_size[1], least), np.minimum(at_size[2], most)
     solved = solve_chain(system)
     if solved is None:
         return _swept(goal, system, (least, most))
     tight = Tight(Parts(solved.high, solved.low), np.arange(system.nodes), solved.inverse, solved.scale)
     proved = chain_bounds(system, tight)
+    if not goal.counts_cost and (proved[0] is None or proved[1] is None):
+        proved = _past_traps(system, proved)
     lower = least if proved[0] is None else np.maximum(proved[0], least)
     upper = most if proved[1] is None else np.minimum(proved[1], most)
     return np.clip(solved.high + solved.low, lower, upper), lower, upper
+
+
+def _past_traps(system: System, proved: tuple[Floats | None, Floats | None]) -> tuple[Floats | None, Floats | None]:
+    """Return the bounds of a chain of probabilities that lingers, those that are proved already where there are such."""
+    from ratherthan.solve.trapped.chains import chain_past_traps
+
+    found = chain_past_traps(system)
+    if found is None:
+        return proved
+    lower, upper = (ours if theirs is None else theirs for ours, theirs in zip(found, proved, strict=True))
+    return lower, upper
+
+
+def _at_size(goal: Goal, system: System) -> tuple[Floats, Floats, Floats] | None:
+    """Return values and bounds of a chain with many states by sweeps, None where these do not suit."""
+    if not goal.counts_cost or system.nodes <= SOME:
+        return None
+    from ratherthan.solve.contracting import chain_bounds_at_size
+
+    return chain_bounds_at_size(system, goal.maximise, goal.discount)
 
 
 def _widest(goal: Goal, count: int) -> tuple[Floats, Floats]:

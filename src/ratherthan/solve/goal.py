@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ratherthan.errors import PropertyError
 from ratherthan.model.formula import states_where
 from ratherthan.model.index import Index, branches_of, build_index, index_of
-from ratherthan.model.mdp import MDP, Bools, Floats
+from ratherthan.model.mdp import MDP, Bools, Floats, Ints
 from ratherthan.model.objective import (
     Discounted,
     ExpectedCost,
@@ -138,6 +138,9 @@ class Task:
         The policy's choice in the states that are neither arriving nor open.
     can_arrive : array of bool, ``[S]``
         As in Solution.
+    nearest : tuple of array of int, optional
+        Where the target is reached with probability 1: how many steps along choices that stay there it is away, ``[S]``, below 0
+        elsewhere; and these states, the nearest first.
     """
 
     goal: Goal
@@ -150,6 +153,7 @@ class Task:
     attaining: Bools  # [C]
     elsewhere: Choices  # [S]
     can_arrive: Bools  # [S]
+    nearest: tuple[Ints, Ints] | None = None
 
 
 def mission_sets(problem: Problem, mission: Mission) -> tuple[Bools, Bools]:
@@ -237,7 +241,7 @@ def _paying(mdp: MDP, objective: ExpectedCost | ExpectedReward | Discounted, *, 
     if isinstance(objective, ExpectedCost):
         cost, costly = costs_of(mdp, index, objective.reward)
         size, gaining, losing, kind = cost, np.ones(mdp.choices, dtype=np.bool_), ~costly, Kind.COST
-        exact = ~costly
+        exact = losing
     else:
         paid = paid_of(mdp, index, objective.reward)
         counts = (through & ~target)[index.choice_to_state]  # what is paid after the end does not count
@@ -272,7 +276,7 @@ def _paying(mdp: MDP, objective: ExpectedCost | ExpectedReward | Discounted, *, 
     )
 
 
-def restricted(goal: Goal, permitted: Bools) -> tuple[Goal, Choices]:
+def restricted(goal: Goal, permitted: Bools) -> tuple[Goal, Choices | None]:
     """Return a goal on the permitted choices alone, and which choices of the goal they are.
 
     Parameters
@@ -284,11 +288,13 @@ def restricted(goal: Goal, permitted: Bools) -> tuple[Goal, Choices]:
     Returns
     -------
     Goal
-    kept : array of int, ``[C']``
+    kept : array of int, ``[C']``, or None
+        None where all are permitted.
     """
-    index, kept = goal.index, np.flatnonzero(permitted)
-    if len(kept) == index.choices:
-        return goal, kept
+    index = goal.index
+    if permitted.all():
+        return goal, None
+    kept = np.flatnonzero(permitted)
     branches, offsets = branches_of(index.choice_to_branches, kept)
     own = np.concatenate([[0], np.cumsum(np.bincount(index.choice_to_state[kept], minlength=index.states))])
     made = build_index(own, offsets, index.branch_to_target[branches])

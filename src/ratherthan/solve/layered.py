@@ -66,8 +66,10 @@ def layered_bounds(system: System, maximise: bool, *, most: float = np.inf) -> L
     Returns
     -------
     Layered, or None
-        None also where numbers exceed the range of doubles.
+        None also where numbers exceed the range of doubles, or probabilities were rounded to less than it.
     """
+    if len(system.faint):
+        return None
     wide = _wide(system)
     order = compiled(sinks_first, len(system.target))(wide[1][wide[0]], wide[2])
     if len(order) < system.nodes:
@@ -90,6 +92,8 @@ def swept_bounds(system: System, lower: Floats, upper: Floats, maximise: bool) -
     finite everywhere is left.
     """
     order = np.arange(system.nodes)
+    if len(system.faint):
+        return lower, upper
     if np.isfinite(lower).all():
         lower = _passed(system, order, lower, -1.0, maximise)
     if np.isfinite(upper).all():

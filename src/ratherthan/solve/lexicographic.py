@@ -48,14 +48,23 @@ from ratherthan.model.mdp import Bools, Floats
 from ratherthan.model.objective import Level
 from ratherthan.model.policy import Policy
 from ratherthan.model.problem import Problem
+from ratherthan.model.watch import keep
 from ratherthan.solve.chain import Evaluated, chain_of, evaluated
 from ratherthan.solve.goal import Goal, Kind, Task, goal_of, restricted
 from ratherthan.solve.levels import wants_arrival
 from ratherthan.solve.optimum import LOSS, TIES, Method, Optimum, optimum
+from ratherthan.solve.policy_iteration import PolicyIteration
 from ratherthan.solve.task import task_of
 from ratherthan.solve.tied import first_tied
 
 __all__ = ["Ordered", "ordered", "over_after"]
+
+DOUBT = 1e-7
+"""Up to which relative width bounds that sweeps have proved count as narrow."""
+
+ROUGHLY = ("sweeps", "rough")
+"""What the names of methods contain that tell values, and so ties, as narrowly as their bounds are."""
+NOISE = 1e-14
 
 Progress = Callable[[str], None]
 Choices = npt.NDArray[np.int64]
@@ -100,6 +109,8 @@ def ordered(
     progress : callable, optional
     """
     for finest in range(len(TIES)):
+        if finest > 0 and method is None:  # ties that rough values tell are too many, or the wrong ones
+            method = PolicyIteration()
         goals, best = _one_after_the_other(problem, levels, method, progress, finest)
         if len(levels) == 1:
             return Ordered(goals, best, best[0].choice, (best[0].attained,), 0)
@@ -122,17 +133,20 @@ def _one_after_the_other(
         if progress is not None and len(levels) > 1:
             progress(f"objective {number} of {len(levels)}")
         goal = goal_of(problem, level, over)
+        keep(found=tuple(zip(goals, found, strict=True)), goal=goal if number == 1 else None, task=None)
         narrowed, kept = restricted(goal, permitted)
         must_end = must_end & goal.running
         task = _task(narrowed, level, must_end)
         best = optimum(task, method, progress, finest=finest)
+        if number < len(levels) and narrowed.counts_cost and any(way in best.engine for way in ROUGHLY):
+            best = best._replace(tied=best.tied | _undecided(narrowed, best))
         if number < len(levels):
             _refuse_endless(goal, best, level)
-        choice = kept[best.choice]
+        choice = best.choice if kept is None else kept[best.choice]
         if found:  # where this level has ended, or is lost, the levels before decide
             choice = np.where(goal.running & (best.values != goal.unreached), choice, found[-1].choice)
         tied = np.zeros(goal.index.choices, dtype=np.bool_)
-        tied[kept[best.tied]] = True
+        tied[best.tied if kept is None else kept[best.tied]] = True
         tied[choice] = True
         goals.append(goal)
         found.append(best._replace(choice=choice, tied=tied))
@@ -144,6 +158,17 @@ def _one_after_the_other(
         if goal.kind is Kind.DISCOUNTED and (must_end & ~_ending(goal, over, permitted)).any():
             raise _not_attained(level, "A discounted sum")
     return tuple(goals), tuple(found)
+
+
+def _undecided(goal: Goal, best: Optimum) -> Bools:
+    """Return the choices that the bounds of a level leave open whether they are best, ``[C]``."""
+    index, sign = goal.index, -1.0 if goal.maximise else 1.0
+    low, high = (best.upper, best.lower) if goal.maximise else (best.lower, best.upper)
+    with np.errstate(invalid="ignore", over="ignore"):
+        mean = np.add.reduceat(goal.probability * low[index.branch_to_target], index.choice_to_branches[:-1])
+        least, most = goal.cost + goal.discount * mean, high[index.choice_to_state]
+        found: Bools = best.task.allowed & np.isfinite(most) & (sign * (least - most) <= NOISE * np.abs(most))
+    return found
 
 
 def _demands_an_end(goal: Goal) -> bool:
@@ -248,9 +273,12 @@ def _near_the_end(goal: Goal, wanted: Choices, arriving: Choices) -> Iterator[Ch
 
 
 def _attains(goal: Goal, best: Optimum, attained: Evaluated) -> bool:
-    """Return whether a policy provably attains a level, up to a small loss, wherever that is a number."""
+    """Return whether a policy provably attains a level, up to a small loss and what its bounds leave open, wherever that is a number."""
     finite = np.isfinite(best.values)
     wanted, lower, upper = best.values[finite], attained.lower[finite], attained.upper[finite]
-    width = upper - lower if goal.signed else np.zeros(len(wanted))
+    bounded = np.isfinite(lower) & np.isfinite(upper)
+    width = np.subtract(upper, lower, out=np.zeros(len(wanted)), where=bounded)
+    if not goal.signed:
+        width = np.minimum(width, DOUBT * np.abs(wanted))
     lost: Floats = np.abs((lower if goal.maximise else upper) - wanted)
-    return bool((lost <= LOSS * np.abs(wanted) + np.where(np.isfinite(width), width, 0.0)).all())
+    return bool((lost <= LOSS * np.abs(wanted) + width).all())

@@ -25,6 +25,7 @@ import numpy as np
 
 from ratherthan.model._kernels import is_compiled
 from ratherthan.model.mdp import Floats
+from ratherthan.model.watch import look
 from ratherthan.solve.system import System, drift, exchanged, two_sum
 
 __all__ = ["GRAIN", "MOST_DENSE", "Inverse", "Method", "Solved", "methods_for", "solve_chain"]
@@ -37,6 +38,7 @@ class Method(NamedTuple):
 
     build: Callable[[System], Inverse | None]
     entrywise: bool = False
+    name: str = "a direct solve"
 
 
 MOST_DENSE = 400
@@ -66,6 +68,7 @@ class Solved(NamedTuple):
     method: Method
     exactness: float  # the largest drift, in units of its rounding error; ∞ where the chain leaves too slowly to tell
     scale: Floats | None = None  # [n], of values with signs: the expected sum of absolute payments
+    failed: tuple[str, ...] = ()  # the names of methods tried before that gave no numbers
 
     @property
     def size(self) -> Floats:
@@ -82,14 +85,18 @@ def methods_for(system: System) -> tuple[Method, ...]:
         The methods serve all systems of its size and kind.
     """
     if system.nodes <= MOST_DENSE:
-        return (Method(_dense), Method(_dense_elimination, entrywise=True))
+        return (
+            Method(_dense, name="a dense inverse"),
+            Method(_dense_elimination, entrywise=True, name="dense elimination"),
+        )
     from ratherthan.solve import sparse
 
+    elimination = Method(sparse.elimination, entrywise=True, name="sparse elimination")
+    krylov = Method(sparse.krylov, name="BiCGSTAB")
     if is_compiled(len(system.target)):
-        return (Method(sparse.elimination, entrywise=True), Method(sparse.krylov))
-    if system.nodes <= SMALL:
-        return (Method(sparse.sparse_lu), Method(sparse.elimination, entrywise=True))
-    return (Method(sparse.sparse_lu), Method(sparse.krylov))
+        return (elimination, krylov)
+    lu = Method(sparse.sparse_lu, name="sparse LU")
+    return (lu, elimination) if system.nodes <= SMALL else (lu, krylov)
 
 
 def solve_chain(system: System, methods: tuple[Method, ...] | None = None) -> Solved | None:
@@ -103,13 +110,17 @@ def solve_chain(system: System, methods: tuple[Method, ...] | None = None) -> So
         What to try; found by `methods_for` by default.
     """
     best: Solved | None = None
+    failed: tuple[str, ...] = ()
     for method in methods_for(system) if methods is None else methods:
+        look()
         inverse = method.build(system)
         if inverse is None:
             continue
         found = _refined(system, method, inverse)
-        if found is not None and (best is None or found.exactness <= best.exactness):
-            best = found
+        if found is None:
+            failed += (method.name,)
+        elif best is None or found.exactness <= best.exactness:
+            best = found._replace(failed=failed)
         if best is not None and (method.entrywise or best.exactness <= GOOD):
             break
     return best
@@ -127,6 +138,7 @@ def _refined(system: System, method: Method, inverse: Inverse) -> Solved | None:
     best: Solved | None = None
     vain, scale = 0, _scale(system, inverse)
     for _ in range(MOST_REFINEMENTS):
+        look()
         step = inverse(total)
         if not np.isfinite(step).all():
             return best

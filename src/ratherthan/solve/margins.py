@@ -10,7 +10,8 @@ policy iteration from the rows that are tight for v, with 2δ in the place of δ
 of the solve. Only rows that are nearly tight ever matter, as relief is paid at every use. A policy that wanders for 1e9 steps
 near an end component collects 1e9 · 1e-16 and no more: the margin is as wide as rounding requires there, and not elsewhere.
 
-The margin is a vector of doubles, so its own rounding shows in its drift: that is added to δ before the second solve.
+The margin is a vector of doubles, so its own rounding shows in its drift: that is added to δ before the second solve, and once more
+where the drift of the margin itself cannot be told from its error (where nothing is paid and all values are the same, say).
 
 Nothing here needs to be right for a bound to be sound: the check decides.
 """
@@ -68,7 +69,12 @@ def margin_of(
         best = least_rows(system, -short)
         rises = short[best] > 0.0
         if not rises.any():
-            return margin
+            left, wrong = drift(system, margin, cost=slack - relief, one=0.0)
+            doubtful = left + wrong > 0.0
+            if not doubtful.any():
+                return margin
+            needed = needed + np.where(doubtful, 4.0 * wrong, 0.0)
+            continue
         better = np.where(rises, best, rows)
         if (better == rows).all():
             return margin

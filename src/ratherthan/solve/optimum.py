@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ratherthan.model.mdp import Bools, Floats
 from ratherthan.model.policy import Policy
+from ratherthan.model.watch import room_for
 from ratherthan.solve.certify import Parts, Tight, chain_margin, never_falls, never_rises, optimum_bound
 from ratherthan.solve.chain import Evaluated, Guess, chain_of, evaluated, nodes_of
 from ratherthan.solve.gathering import loops_in_doubt, most_reward
@@ -19,11 +20,15 @@ from ratherthan.solve.levelling import levelled, raised, without_cancelling
 from ratherthan.solve.linear import Method as LinearMethod
 from ratherthan.solve.linear import Solved
 from ratherthan.solve.policy_iteration import Found, PolicyIteration, iterate_policies, least_rows
+from ratherthan.solve.precise import width_aimed_at
+from ratherthan.solve.stopped import Equations, begun, written
 from ratherthan.solve.sweeps import Sweeps, Swept, arriving_rows, sweep_from_below, swept_between, upper_vector
 from ratherthan.solve.system import System, build_system, drift, rows_of
 from ratherthan.solve.tied import first_tied, fixed_best, tied_choices
+from ratherthan.solve.trapped import ENGINE, suits_traps
+from ratherthan.solve.trapped.horizon import Horizon, within_steps
 
-__all__ = ["Method", "Optimum", "optimum"]
+__all__ = ["Method", "Optimum", "equations_of", "optimum"]
 
 Progress = Callable[[str], None]
 Method = PolicyIteration | Sweeps
@@ -31,9 +36,17 @@ Nodes = npt.NDArray[np.int64]
 
 TIES = np.array([1e-10, 1e-13, -np.inf])
 """Relative tolerances within which choices are tied, the next where the policy loses; at last the solver's rows alone."""
+BYTES = 64
+"""What equations take per branch of the model, with what is derived from them."""
 NO_METHOD = LinearMethod(lambda _: None)
+COARSE = 1e-10
+"""Below which relative width of bounds windows are left to sweeps that go on."""
 LOSS = 1e-10
 """Up to which relative loss a policy counts as attaining the optimum."""
+SEVERAL = 50_000
+"""Up to how many nodes probabilities that one method could not prove are left to the other."""
+OPEN = 1e-3
+"""How wide the bounds of a probability must be for what holds within a number of steps to be of interest."""
 
 
 class Optimum(NamedTuple):
@@ -49,6 +62,7 @@ class Optimum(NamedTuple):
     solves: int
     residual: float
     task: Task
+    horizon: Horizon | None = None  # [S], where nothing else was proved from above
 
 
 def optimum(task: Task, method: Method | None, progress: Progress | None = None, *, finest: int = 0) -> Optimum:
@@ -63,8 +77,24 @@ def optimum(task: Task, method: Method | None, progress: Progress | None = None,
     finest : int
         Which of the tolerances for ties to begin with; the later, the finer.
     """
+    begun(task)
     with np.errstate(all="ignore"):  # numbers beyond doubles become ±∞ or NaN, which no check lets pass
-        return _optimum(task, method, progress, finest)
+        best = _optimum(task, method, progress, finest)
+        return best._replace(horizon=_horizon(best))
+
+
+def _horizon(best: Optimum) -> Horizon | None:
+    """Return what holds within a number of steps, where no bound against all policies was proved of a largest probability."""
+    task = best.task
+    own, goal = task.open, task.goal
+    if goal.counts_cost or not goal.maximise or not (best.upper[own] - best.lower[own] > OPEN).any():
+        return None
+    found = within_steps(_systems(task)[2], best.values[own])
+    if found is None:
+        return None
+    upper = task.fixed.copy()
+    upper[own] = np.minimum(found.upper, best.upper[own])
+    return Horizon(found.steps, upper)
 
 
 def _optimum(task: Task, method: Method | None, progress: Progress | None, finest: int) -> Optimum:
@@ -75,19 +105,62 @@ def _optimum(task: Task, method: Method | None, progress: Progress | None, fines
         choice = first_tied(task, task.internal | task.attaining)
         attained = evaluated(goal, chain_of(goal, Policy(choice=choice)))
         return Optimum(task.fixed, task.fixed, task.fixed, choice, tied, attained, "graph search", 0, 0.0, task)
-    node, core, whole = _systems(task)
-    plain = None if core is not whole or loops_in_doubt(task) else _layered_bounds(task, core)
-    quick = _at_once(task, (core, whole), node, (plain, finest), progress) if method is None else None
+    quick = _windowed(task, progress) if method is None and finest == 0 and width_aimed_at() >= COARSE else None
     if quick is not None:
         return quick
-    found = None
+    node, core, whole = _systems(task)
+    written(task, Equations(node, core, whole))
+    plain = None if core is not whole or loops_in_doubt(task) else _layered_bounds(task, core)
+    if method is None and plain is not None and plain.narrow:
+        return _layered(task, core, node, plain, finest)
+    if method is None and suits_traps(task, core) and (past := _likely(task, (core, whole), node, finest, progress)):
+        return past
+    swept = _contracted(task, (core, whole), node, (plain, finest)) if method is None else None
+    if swept is not None and swept.good and swept.optimum is not None:
+        return swept.optimum
+    grown = _growing(task, core, node) if swept is not None else None
+    if grown is not None:
+        return _optimum(grown, method, progress, finest)
+    best = None
     if not isinstance(method, Sweeps):
-        found = iterate_policies(core, goal.maximise, method or PolicyIteration(), progress)
-    if found is None:
-        sweeps = method if isinstance(method, Sweeps) else Sweeps()
-        return _swept(task, (core, whole), node, sweeps, progress)
-    if found.endless is not None:
-        return _optimum(_without(task, node, found.endless), method, progress, finest)
+        start = None if swept is None else swept.rows
+        found = iterate_policies(core, goal.maximise, method or PolicyIteration(), progress, start=start)
+        if found is not None and found.endless is not None:
+            return _optimum(_without(task, node, found.endless), method, progress, finest)
+        if found is not None:
+            best = _by_equations(_Asked(task, core, whole, node, plain, finest, method, progress), found)
+    if best is None and swept is not None and swept.optimum is not None:
+        return swept.optimum
+    if best is None:
+        best = _swept(task, (core, whole), node, method if isinstance(method, Sweeps) else Sweeps(), progress)
+        after = "" if isinstance(method, Sweeps) else ", after policy iteration gave no numbers"
+        return best._replace(engine=best.engine + after)
+    return best if swept is None or swept.optimum is None else _better(best, swept.optimum)
+
+
+class _Asked(NamedTuple):
+    """A task with its systems, the bounds of a backward pass if there are any, and how it is to be solved."""
+
+    task: Task
+    core: System
+    whole: System
+    node: Nodes
+    plain: Layered | None
+    finest: int
+    method: Method | None
+    progress: Progress | None
+
+
+def _better(best: Optimum, other: Optimum) -> Optimum:
+    """Return an optimum with the better of the bounds that two methods proved."""
+    lower, upper = np.maximum(best.lower, other.lower), np.minimum(best.upper, other.upper)
+    return best._replace(values=np.clip(best.values, lower, upper), lower=lower, upper=upper)
+
+
+def _by_equations(asked: _Asked, found: Found) -> Optimum:
+    """Return the optimum that policy iteration found, with what can be proved of it."""
+    task, core, whole, node, plain, finest, method, progress = asked
+    goal = task.goal
     choice, tied, attained, solves = _attaining(task, core, node, found, finest)
     if progress is not None:
         progress("proving the bounds")
@@ -97,6 +170,8 @@ def _optimum(task: Task, method: Method | None, progress: Progress | None, fines
         level = levelled(task, tied)
         if level is not None:
             return _on_level(task, level, method, progress, finest)
+    if proved is None and (grown := _growing(task, core, node)) is not None:
+        return _optimum(grown, method, progress, finest)
     values, lower, upper = _joined(task, found.values[node[task.open]], proved, attained)
     values, lower, upper = _tightened(task, whole, plain, (values, lower, upper))
     if proved is None and goal.kind is Kind.REWARD:
@@ -106,21 +181,16 @@ def _optimum(task: Task, method: Method | None, progress: Progress | None, fines
             values = np.clip(values, lower, upper)
     residual = _residual(core, goal.maximise, found.solved.high, found.solved.low)
     tied = fixed_best(task) | tied & task.open[goal.index.choice_to_state]
-    return Optimum(values, lower, upper, choice, tied, attained, found.engine, found.rounds + solves, residual, task)
+    best = Optimum(values, lower, upper, choice, tied, attained, found.engine, found.rounds + solves, residual, task)
+    if goal.counts_cost or not (upper - lower > OPEN).any() or core.nodes > SEVERAL:
+        return best
+    past = _past_traps(task, (core, whole), node, finest, progress)
+    return best if past is None or _width(past) >= _width(best) else past
 
 
-def _at_once(
-    task: Task,
-    systems: tuple[System, System],
-    node: Nodes,
-    layered: tuple[Layered | None, int],
-    progress: Progress | None,
-) -> Optimum | None:
-    """Return the optimum by one backward pass or by windowed sweeps, None where neither suits."""
-    (core, whole), (plain, finest) = systems, layered
-    if plain is not None and plain.narrow:
-        return _layered(task, core, node, plain, finest)
-    return _windowed(task, core, whole, progress) if finest == 0 else None
+def _width(best: Optimum) -> float:
+    """Return how wide the bounds are, on average."""
+    return float((best.upper - best.lower).mean())
 
 
 def _layered_bounds(task: Task, core: System) -> Layered | None:
@@ -160,11 +230,77 @@ def _layered(task: Task, core: System, node: Nodes, plain: Layered, finest: int)
     return Optimum(values, lower, upper, choice, tied, attained, found.engine, 1 + solves, residual, task)
 
 
-def _windowed(task: Task, core: System, whole: System, progress: Progress | None) -> Optimum | None:
+def _windowed(task: Task, progress: Progress | None) -> Optimum | None:
     """Return the optimum by windowed sweeps, None where these do not suit."""
     from ratherthan.solve.windowed import suits_windows, windowed_optimum
 
-    return windowed_optimum(task, core, progress=progress) if suits_windows(task, core, whole) else None
+    return windowed_optimum(task, progress=progress) if suits_windows(task) else None
+
+
+def _likely(
+    task: Task, systems: tuple[System, System], node: Nodes, finest: int, progress: Progress | None
+) -> Optimum | None:
+    """Return the optimum of many probabilities; where one method could not prove them, with what the other can."""
+    past = _past_traps(task, systems, node, finest, progress)
+    if past is None or systems[0].nodes > SEVERAL or not (past.upper - past.lower > OPEN).any():
+        return past
+    return _better(_optimum(task, PolicyIteration(), progress, finest), past)
+
+
+def _past_traps(
+    task: Task, systems: tuple[System, System], node: Nodes, finest: int, progress: Progress | None
+) -> Optimum | None:
+    """Return the optimum of probabilities in two parts, None where its equations would fill, or nothing could be proved of it."""
+    from ratherthan.solve.trapped.attained import past_traps
+
+    found = past_traps(task, systems, node, finest, progress)
+    if found is None:
+        return None
+    values, lower, upper = _joined(task, found.values, found.bound, found.attained)
+    tied = fixed_best(task) | found.tied & task.open[task.goal.index.choice_to_state]
+    return Optimum(values, lower, upper, found.choice, tied, found.attained, ENGINE, found.rounds, found.residual, task)
+
+
+class _Contracted(NamedTuple):
+    """An optimum found by sweeps, whether its bounds are narrow enough, and rows for others to begin with."""
+
+    optimum: Optimum | None
+    rows: Nodes | None  # [n]
+    good: bool
+
+
+def _contracted(
+    task: Task,
+    systems: tuple[System, System],
+    node: Nodes,
+    layered: tuple[Layered | None, int],
+) -> _Contracted | None:
+    """Return the optimum by sweeps of any kind of sum, None where these do not suit or come to no end."""
+    from ratherthan.solve.contracting import contracted, suits_contraction
+
+    (core, whole), (plain, finest) = systems, layered
+    if not suits_contraction(task, core) or loops_in_doubt(task):
+        return None
+    found, rows = contracted(task, systems, node, finest=finest)
+    if found is None:
+        return _Contracted(None, rows, good=False)
+    values, lower, upper = _joined(task, found.values[node[task.open]], found.bound, found.attained)
+    values, lower, upper = _tightened(task, whole, plain, (values, lower, upper))
+    tied = fixed_best(task) | found.tied & task.open[task.goal.index.choice_to_state]
+    best = Optimum(
+        values, lower, upper, found.choice, tied, found.attained, found.engine, found.rounds, found.residual, task
+    )
+    return _Contracted(best, rows, good=found.good)
+
+
+def _growing(task: Task, core: System, node: Nodes) -> Task | None:
+    """Return the task when sweeps have found where more and more can be gathered, None where they find nothing."""
+    if task.goal.kind is not Kind.REWARD or not task.goal.signed:
+        return None
+    from ratherthan.solve.contracting.growth import growing_nodes
+
+    endless = growing_nodes(core)
+    return None if endless is None else _without(task, node, endless)
 
 
 def _without(task: Task, node: Nodes, endless: Bools) -> Task:
@@ -225,9 +361,15 @@ def _swept(
     return Optimum(values, lower, upper, choice, tied, attained, "value iteration", swept.sweeps, residual, task)
 
 
+def equations_of(task: Task) -> Equations:
+    """Return the equations of a task."""
+    return Equations(*_systems(task))
+
+
 def _systems(task: Task) -> tuple[Nodes, System, System]:
     """Return the node of each state, the system with end components collapsed, and that of the open states as they are."""
     goal = task.goal
+    room_for(BYTES * goal.index.work, f"The equations of a model of {goal.index.work} branches")
     single = nodes_of(task.open, task.fixed)
     collapsed = task.open & (task.component >= 0)
     whole = _system(goal, np.flatnonzero(task.allowed), single)
@@ -259,6 +401,7 @@ def _system(goal: Goal, rows: Nodes, node: Nodes) -> System:
         exact=goal.exact,
         signed=goal.signed,
         discount=goal.discount,
+        given=True,
     )
 
 

@@ -11,7 +11,7 @@ values that can only be improved upon, so that every greedy policy on the way ar
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from ratherthan.model import graph
 from ratherthan.model.mdp import Bools, Floats
+from ratherthan.model.watch import keep, look
 from ratherthan.solve.endless import rising_nodes, stuck_nodes
 from ratherthan.solve.linear import GRAIN, MOST_DENSE, Solved, methods_for, solve_chain
 from ratherthan.solve.system import System, drift, exchanged, padded, rows_of
@@ -79,7 +80,12 @@ class Found:
 
 
 def iterate_policies(
-    system: System, maximise: bool, settings: PolicyIteration, progress: Progress | None = None
+    system: System,
+    maximise: bool,
+    settings: PolicyIteration,
+    progress: Progress | None = None,
+    *,
+    start: Nodes | None = None,
 ) -> Found | None:
     """Return the optimum of a system by policy iteration, None where an equation could not be solved.
 
@@ -91,11 +97,14 @@ def iterate_policies(
     settings : PolicyIteration
     progress : callable, optional
         Told now and then how far it is.
+    start : array of int, ``[n]``, optional
+        Rows to begin with, which arrive; those that lead towards sinks by default.
     """
-    rows = rows_towards_sinks(system)
+    rows = rows_towards_sinks(system) if start is None else start
     sign = -1.0 if maximise else 1.0
     methods = methods_for(rows_of(system, rows))
     found: Found | None = None
+    failed: dict[str, None] = {}
     floors = iter(FLOORS)
     floor, vain, sweeps = next(floors), 0, settings.sweeps
     for number in range(1, settings.most_rounds + 1):
@@ -106,6 +115,8 @@ def iterate_policies(
                 return replace(found, endless=rising)
             sweeps = 0
         solved = solve_chain(rows_of(system, rows), methods) if stuck is None else None
+        if solved is not None:
+            failed.update(dict.fromkeys(solved.failed))
         if found is None:
             if solved is None:
                 return None
@@ -120,14 +131,23 @@ def iterate_policies(
             if solved is None or lost:
                 solved, rows = found.solved, found.rows
         better, changed = _improved_rows(system, sign, solved, rows, floor)
-        found = Found(solved=solved, rows=rows, rounds=number, converged=changed == 0, engine="policy iteration")
+        found = Found(solved=solved, rows=rows, rounds=number, converged=changed == 0, engine=_engine(failed))
+        keep(system=system, guess=found.values, rows=rows, solved=solved, engine=found.engine)
+        told = f"policy iteration, round {number}: {changed} of {system.nodes} choices improved"
+        look(told)
+        if progress is not None:
+            progress(told)
         if changed == 0:
             return found
-        if progress is not None:
-            progress(f"policy iteration, round {number}: {changed} of {system.nodes} choices improved")
         sweeping = sweeps > 0 and system.nodes > MOST_DENSE and changed > FEW * system.nodes
         rows = _swept(system, sign, solved.high, better, sweeps) if sweeping else better
     return found
+
+
+def _engine(failed: Iterable[str]) -> str:
+    """Return what the values are owed to, and which solvers gave no numbers."""
+    names = " and ".join(failed)
+    return f"policy iteration, after {names} gave no numbers" if names else "policy iteration"
 
 
 def _worse(sign: float, solved: Solved, found: Found) -> bool:
@@ -213,6 +233,7 @@ def _swept(system: System, sign: float, values: Floats, rows: Nodes, sweeps: int
     paid = sign * system.cost / leave
     extended = sign * padded(values, 1.0)
     for _ in range(sweeps):
+        look()
         extended[:n] = np.minimum.reduceat(paid + step @ extended, system.node_to_rows[:-1])
     swept = sign * extended[:n]
     total, error = drift(system, swept)

@@ -89,7 +89,9 @@ def _refuse_infinite(mdp: MDP, name: str, total: Floats) -> None:
 
 
 def _total(mdp: MDP, reward: Reward, *, absolute: bool = False) -> Floats:
-    """Return Σ of the parts per choice, or of their absolute values."""
+    """Return Σ of the parts per choice, or of their absolute values; what is said of choices alone as it is, not a copy."""
+    if reward.choice is not None and reward.state is None and reward.branch is None:
+        return np.abs(reward.choice) if absolute else reward.choice
     total = np.zeros(mdp.choices)
     with np.errstate(over="ignore", invalid="ignore"):
         for part, values in reward.parts():
@@ -147,13 +149,17 @@ def paid_of(mdp: MDP, index: Index, name: str | None) -> Paid:
 def _exact(mdp: MDP, index: Index, reward: Reward) -> Bools:
     """Return ``[C]``: where the parts of a reward add up without rounding, one certain branch at most being paid for."""
     single = (np.diff(mdp.choice_to_branches) == 1) & (mdp.branch_to_probability[mdp.choice_to_branches[:-1]] == 1.0)
-    total, exact = np.zeros(mdp.choices), np.ones(mdp.choices, dtype=np.bool_)
+    total: Floats | None = None
+    exact = np.ones(mdp.choices, dtype=np.bool_)
     for part, values in reward.parts():
         if part == "branch":
             exact &= single | ~_choices_with(index, part, values != 0.0)
             given = np.where(single, values[mdp.choice_to_branches[:-1]], 0.0)
         else:
             given = values[index.choice_to_state] if part == "state" else values
+        if total is None:
+            total = given
+            continue
         total, lost = two_sum(total, given)
         exact &= lost == 0.0
     return exact
@@ -191,13 +197,18 @@ def costs_of(mdp: MDP, index: Index, name: str | None) -> tuple[Floats, Bools]:
     PropertyError
         If there is no such reward, or it (or a part of a weighted sum) is negative somewhere.
     """
-    for known in (weights_of(name, mdp.rewards) or {}) if name is not None else {}:
+    if name is None:
+        return np.ones(mdp.choices), np.ones(mdp.choices, dtype=np.bool_)
+    total, pays = expected_reward(mdp, name), np.zeros(mdp.choices, dtype=np.bool_)
+    for known in weights_of(name, mdp.rewards) or {}:
         for part, values in mdp.rewards[known].parts():
-            negative = np.flatnonzero(values < 0)
-            if len(negative):
-                _refuse(mdp, index, known, (part, int(negative[0]), float(values[negative[0]])))
-    paid = paid_of(mdp, index, name)
-    return np.where(paid.pays, np.maximum(paid.total, SMALLEST), 0.0), paid.pays
+            if values.min() < 0.0:
+                first = int(np.argmax(values < 0.0))
+                _refuse(mdp, index, known, (part, first, float(values[first])))
+            pays |= _choices_with(index, part, values > 0.0)
+    if pays.all() and total.min() >= SMALLEST:
+        return total, pays
+    return np.where(pays, np.maximum(total, SMALLEST), 0.0), pays
 
 
 def _refuse(mdp: MDP, index: Index, name: str, fault: tuple[str, int, float]) -> None:

@@ -19,6 +19,7 @@ class Outcome(Enum):
     CERTIFIED = "The values are proved: one check by Bellman's operator confirmed the bounds."
     LOWER_ONLY = "Only the lower bounds are proved."
     UPPER_ONLY = "Only the upper bounds are proved."
+    HORIZON = "The lower bounds are proved; from above only what plans of a limited number of steps attain, and beyond that nothing."
     STOPPED = "The solver stopped before it converged; the bounds that were proved so far are given."
     UNCERTIFIED = "The values are not certified: no bounds are known, and no claim rests on them."
 
@@ -56,6 +57,12 @@ class Solution:
         Bellman sweeps (or linear solves) done.
     residual : float
         The largest |Tv - v| over finite values.
+    horizon : int, optional
+        Where a largest probability could not be bounded from above: the number of steps that `within` holds for.
+    within : array of float, ``[S]``, optional
+        What no plan of at most `horizon` steps exceeds, of the first objective. It is no bound of the value, and no claim rests on it.
+    precision : float
+        The relative width of bounds that was wanted.
     """
 
     problem: Problem
@@ -75,6 +82,9 @@ class Solution:
     engine: str
     sweeps: int
     residual: float
+    horizon: int | None = None
+    within: Floats | None = None  # [S]
+    precision: float = 1e-6
 
     @property
     def ended(self) -> Bools:

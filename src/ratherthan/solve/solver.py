@@ -16,28 +16,34 @@ import numpy as np
 
 from ratherthan.errors import PropertyError
 from ratherthan.model.mdp import MDP, Bools, Floats
-from ratherthan.model.objective import Level, Mission, Objective, levels_of
+from ratherthan.model.objective import Level, Lexicographic, Mission, Objective, levels_of
 from ratherthan.model.policy import Policy, check_policy
 from ratherthan.model.problem import Problem
+from ratherthan.model.watch import phase, watching
 from ratherthan.solve.chain import Chain, Evaluated, chain_of, evaluated, refuse_unsaid
 from ratherthan.solve.goal import Goal, goal_of, reaching
 from ratherthan.solve.lexicographic import ordered, over_after
 from ratherthan.solve.optimum import Method, Optimum
+from ratherthan.solve.precise import FINEST, PRECISION, aiming, precision_wanted
 from ratherthan.solve.solution import Outcome, Solution
+from ratherthan.solve.stopped import finishing, keeping
 from ratherthan.solve.wanted import objective_of
 
-__all__ = ["arrival", "evaluate", "solve", "unfolded_for"]
+__all__ = ["arrival", "evaluate", "sharpened", "solve", "unfolded_for"]
 
 Progress = Callable[[str], None]
-
-PRECISION = 1e-6
+FINER = 1e-3
+ENOUGH = 0.9
+"""Which share of the widths may be left for bounds to count as narrower."""
+STEPWISE = ("sweeps", "rough")
+"""What the names of methods contain that come nearer step by step."""
 
 
 def solve(
     problem: Problem,
     objective: Objective | None = None,
     *,
-    precision: float = PRECISION,
+    precision: float | None = None,
     method: Method | None = None,
     progress: Progress | None = None,
 ) -> Solution:
@@ -48,8 +54,8 @@ def solve(
     problem : Problem
     objective : Objective, optional
         The problem's own by default.
-    precision : float
-        The relative width of bounds that is wanted; where it is not reached, the outcome says so.
+    precision : float, optional
+        The relative width of bounds that is wanted, 1e-6 by default; where it is not reached, the outcome says so.
     method : PolicyIteration or Sweeps, optional
         The solver and its settings. By default the program chooses.
     progress : callable, optional
@@ -66,11 +72,17 @@ def solve(
     ------
     PropertyError
         If there is no objective, or it does not fit the model (an unknown reward, a negative one …).
+    StoppedError
+        If a limit is reached (`ratherthan.watching`); its `solution` has the bounds that were proved by then.
     """
     wanted = objective_of(problem, objective)
     problem, levels = unfolded_for(problem, wanted), levels_of(wanted)
-    found = ordered(problem, levels, method, progress)
+    precision = precision_wanted() if precision is None else precision
+    aim = precision if len(levels) == 1 else min(precision, PRECISION)  # which choices are tied takes more to tell
+    with aiming(aim), keeping(problem, levels), watching(tell=progress):
+        found = ordered(problem, levels, method, progress)
     good, bad = found.goals[0].ends
+    horizon = found.best[0].horizon
     bounds = [
         _facing(goal, best.values, best.lower, best.upper) for goal, best in zip(found.goals, found.best, strict=True)
     ]
@@ -97,7 +109,37 @@ def solve(
         engine=", ".join(dict.fromkeys(best.engine for best in found.best)),
         sweeps=sum(best.solves for best in found.best),
         residual=max(best.residual for best in found.best),
+        horizon=None if horizon is None else horizon.steps,
+        within=None if horizon is None else horizon.upper,
+        precision=precision,
     )
+
+
+def sharpened(solution: Solution, progress: Progress | None = None) -> Solution | None:
+    """Return the same solution with narrower bounds, None where there is no hope of any.
+
+    Parameters
+    ----------
+    solution : Solution
+        Only of sweeps, or of roughly solved equations, there is more to be had; others gave what doubles can tell.
+    progress : callable, optional
+    """
+    stepwise = any(way in solution.engine for way in STEPWISE)
+    if solution.precision <= FINEST or not stepwise or solution.outcome not in (Outcome.CERTIFIED, Outcome.STOPPED):
+        return None
+    finer = max(FINER * solution.precision, FINEST)
+    wanted = Lexicographic(levels=solution.objectives) if len(solution.objectives) > 1 else solution.objectives[0]
+    if solution.given:
+        found = evaluate(solution.problem, solution.policy, wanted, precision=finer, progress=progress)
+    else:
+        found = solve(solution.problem, wanted, precision=finer, progress=progress)
+    return found if _widths(found) < ENOUGH * _widths(solution) else None
+
+
+def _widths(solution: Solution) -> float:
+    """Return the sum of the widths of all bounds that are finite."""
+    finite = np.isfinite(solution.lower) & np.isfinite(solution.upper)
+    return float((solution.upper[finite] - solution.lower[finite]).sum())
 
 
 def evaluate(
@@ -105,7 +147,7 @@ def evaluate(
     policy: Policy,
     objective: Objective | None = None,
     *,
-    precision: float = PRECISION,
+    precision: float | None = None,
     method: Method | None = None,
     progress: Progress | None = None,
 ) -> Solution:
@@ -129,7 +171,7 @@ def evaluate(
     ------
     PolicyError
         If the policy does not fit the model, or says nothing of a state that it reaches.
-    PropertyError
+    PropertyError, StoppedError
         As for `solve`.
     """
     wanted = objective_of(problem, objective)
@@ -137,14 +179,19 @@ def evaluate(
     if len(policy.choice) != product.mdp.states or product is problem:
         check_policy(problem.mdp, policy)
     levels, policy = levels_of(wanted), _lifted(policy, product)
+    precision = precision_wanted() if precision is None else precision
     check_policy(product.mdp, policy)
-    refuse_unsaid(*_chain(product, levels[0], policy))
-    best = solve(product, wanted, precision=precision, method=method, progress=progress)
+    with phase("checking the policy"):
+        first = _chain(product, levels[0], policy)
+        refuse_unsaid(*first)
+    with finishing(None, policy):
+        best = solve(product, wanted, precision=precision, method=method, progress=progress)
     over, found = None, []
-    for level in levels:
-        goal, chain = _chain(product, level, policy, over)
-        found.append((goal, evaluated(goal, chain)))
-        over = over_after(levels[0], goal, best.can_arrive) if over is None else over
+    with aiming(precision), finishing(best, policy), watching(tell=progress):
+        for level in levels:
+            goal, chain = first if over is None else _chain(product, level, policy, over)
+            found.append((goal, evaluated(goal, chain)))
+            over = over_after(levels[0], goal, best.can_arrive) if over is None else over
     values, lower, upper = map(
         np.stack, zip(*(_facing(goal, got.values, got.lower, got.upper) for goal, got in found), strict=True)
     )
@@ -256,7 +303,8 @@ def _outcome(goal: Goal, found: Optimum | Evaluated, precision: float) -> Outcom
     bounded_above = (upper < np.inf) | exact
     bounded_below = (lower > (-np.inf if goal.signed else 0.0)) | exact
     if (bounded_above & bounded_below).all():
-        return Outcome.STOPPED
+        limited = isinstance(found, Optimum) and found.horizon is not None
+        return Outcome.HORIZON if limited else Outcome.STOPPED
     if goal.mirrored:
         bounded_above, bounded_below = bounded_below, bounded_above
     if bounded_above.all():

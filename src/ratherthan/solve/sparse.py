@@ -40,15 +40,15 @@ from ratherthan.solve.system import System
 if TYPE_CHECKING:
     from scipy.sparse import coo_array, csc_array
 
-__all__ = ["elimination", "krylov", "sparse_lu"]
+__all__ = ["elimination", "fills", "krylov", "sparse_lu"]
 
 Inverse = Callable[[Floats], Floats]
 Nodes = npt.NDArray[np.int64]
 
 MOST_FILL = 600
 """Entries per row that factors in the order of levels may have to be tried first."""
-MOST_FILL_IN_ALL = 10_000_000
-"""Up to how many entries they may have in any case."""
+MOST_FILL_IN_ALL = 3_000_000
+"""Up to how many entries they may have in any case: a dense block of so many takes a second or so."""
 HUB = 20.0
 """How many times the mean number of branches make a node a hub."""
 MOST_ITERATIONS = 400
@@ -143,7 +143,7 @@ def _order(system: System, component: Nodes) -> Nodes | None:
         number[knotted] = np.arange(len(knotted))
         kept = ~hub[rows] & ~hub[columns]
         one, other = number[rows[kept]], number[columns[kept]]
-        if _fills(-_levels(system)[knotted], one, other):
+        if fills(-_levels(system)[knotted], one, other):
             return None
         shape = (len(knotted), len(knotted))
         matrix = 2.0 * eye_array(len(knotted)) - coo_array((system.probability[inner][kept], (one, other)), shape=shape)
@@ -155,8 +155,15 @@ def _order(system: System, component: Nodes) -> Nodes | None:
     return order
 
 
-def _fills(level: Nodes, rows: Nodes, columns: Nodes) -> bool:
-    """Return whether the factors of a pattern would fill, by the order of `level`."""
+def fills(level: Nodes, rows: Nodes, columns: Nodes) -> bool:
+    """Return whether the factors of a pattern would fill, by the order of `level`.
+
+    Parameters
+    ----------
+    level : array of int, ``[n]``
+    rows, columns : array of int
+        Where the entries are.
+    """
     n = len(level)
     position = np.empty(n, dtype=np.int64)
     position[np.argsort(level, kind="stable")] = np.arange(n)

@@ -30,6 +30,7 @@ import numpy.typing as npt
 
 from ratherthan.model import graph
 from ratherthan.model.mdp import Floats
+from ratherthan.model.watch import keep, look
 from ratherthan.solve.certify import never_falls, never_rises
 from ratherthan.solve.policy_iteration import least_rows
 from ratherthan.solve.system import System, drift, padded
@@ -137,8 +138,13 @@ def _iterated(
     operator = _operator(system, maximise)
     values = np.full(system.nodes, constant)
     settled, sweeps = False, 0
+    side = {0.0: "lower", 1.0: "upper"}[constant] if not system.signed else "guess"
     while not settled and sweeps < settings.most:
+        keep(system=system, engine="value iteration", **{side: values})
+        look(f"value iteration, sweep {sweeps}" if sweeps % 10 == 0 else None)
         after = step(values, operator(values))
+        if not np.isfinite(after).all():  # beyond doubles, or no numbers: what was reached before is kept
+            break
         settled = bool((np.abs(after - values) <= settings.change * np.abs(after)).all())
         values, sweeps = after, sweeps + 1
     return Swept(values=values, sweeps=sweeps)

@@ -26,6 +26,9 @@ rounding errors of the two sums, which are doubles again (Knuth), and both 0 the
 **Discount.** A discounted row is a row like any other: its branches have the probabilities γp, and with 1 - γ it goes to the
 sink of value 0. So D(a) = cost + γ Σ p (x(t) - x(s)) - (1 - γ) x(s). Each of γp and 1 - γ is rounded once; the k + 21 of the
 6(k + 8) u that the sum above does not need leave room for that u and for the one more branch. Every run is absorbed.
+
+A product γp (or that of p with the share of a random choice) below the least normal double is rounded by up to 2⁻¹⁰⁷⁵, which may be
+all of it. The drift then misses the exact one by as much times δ besides, for each such branch (`System.faint`).
 """
 
 from __future__ import annotations
@@ -45,7 +48,9 @@ __all__ = ["ROUNDING", "System", "build_system", "certain_drift", "drift", "exch
 
 ROUNDING = 6 * 2.0**-53
 UNDERFLOW = 1e-322
-MANY = 200_000
+NORMAL = 2.0**-1022
+"""Below it doubles are rounded by more than a share of themselves."""
+MANY = 30_000
 """From how many branches on compiled loops are worth loading."""
 
 Nodes = npt.NDArray[np.int64]
@@ -72,6 +77,8 @@ class System:
         Whether costs, and values, may be below 0.
     exact : array of bool, ``[m]``, optional
         Which costs were computed without rounding; none by default.
+    given : bool
+        Whether all probabilities are doubles of the model as they stand, so that nothing was rounded but what they sum to.
     """
 
     node_to_rows: Nodes  # [n+1]
@@ -83,6 +90,7 @@ class System:
     size: Floats | None = None  # [m]
     signed: bool = False
     exact: Bools | None = None  # [m]
+    given: bool = False
 
     @property
     def nodes(self) -> int:
@@ -121,6 +129,11 @@ class System:
         return (np.diff(self.row_to_branches) + 8) * ROUNDING
 
     @cached_property
+    def faint(self) -> Nodes:
+        """The branches whose probability was computed, and may have lost more than a share of itself to rounding."""
+        return np.zeros(0, dtype=np.int64) if self.given else np.flatnonzero(self.probability < NORMAL)
+
+    @cached_property
     def index(self) -> Index:
         """The Index of its graph; the sinks are states n and n+1, without choices."""
         ends = np.array([self.rows, self.rows])
@@ -138,6 +151,7 @@ def build_system(
     exact: Bools | None = None,
     signed: bool = False,
     discount: float = 1.0,
+    given: bool = False,
 ) -> System:
     """Return the system of some rows of a model; rows that cannot leave their node are dropped.
 
@@ -155,6 +169,8 @@ def build_system(
         As in System.
     discount : float
         With what a row goes to the sink of value 0 besides: 1 - γ.
+    given : bool
+        As in System; of `probability`.
     """
     own = node[index.choice_to_state[rows]]
     if (np.diff(own) < 0).any():
@@ -177,6 +193,7 @@ def build_system(
         size=None if size is None else size[rows],
         signed=signed,
         exact=None if exact is None else exact[rows],
+        given=given and discount == 1.0,
     )
 
 
@@ -217,6 +234,7 @@ def rows_of(system: System, rows: Nodes) -> System:
         size=None if system.size is None else system.size[rows],
         signed=system.signed,
         exact=None if system.exact is None else system.exact[rows],
+        given=system.given,
     )
 
 
@@ -243,8 +261,13 @@ def drift(system: System, *parts: Floats, cost: Floats | None = None, one: float
     drift, error : array of float, ``[m]``
         The exact drift is within ``drift ± error``.
     """
-    if len(system.target) > MANY and is_compiled(len(system.target)):
-        return _drift_of_many(system, parts, cost, one)
+    found = _drift_of_many if len(system.target) > MANY and is_compiled(len(system.target)) else _drift_of_few
+    total, error = found(system, parts, cost, one)
+    return total, error + _lost_to_rounding(system, parts, one) if len(system.faint) else error
+
+
+def _drift_of_few(system: System, parts: tuple[Floats, ...], cost: Floats | None, one: float) -> tuple[Floats, Floats]:
+    """Return the same as `drift`, but for what faint branches lose."""
     own, begin = system.branch_node, system.row_to_branches[:-1]
     step, size = np.zeros(len(own)), np.zeros(len(own))
     for part in parts:
@@ -263,7 +286,7 @@ def drift(system: System, *parts: Floats, cost: Floats | None = None, one: float
 
 
 def _drift_of_many(system: System, parts: tuple[Floats, ...], cost: Floats | None, one: float) -> tuple[Floats, Floats]:
-    """Return the same as `drift`, computed by a compiled loop: in another order, within the same bound of its error."""
+    """Return the same as `_drift_of_few`, computed by a compiled loop: in another order, within the same bound of its error."""
     values = np.array([padded(part, one if number == 0 else 0.0) for number, part in enumerate(parts)])
     paid, size = (system.cost, system.magnitude) if cost is None else (cost, np.abs(cost))
     kernel = compiled(drift_rows, len(system.target))
@@ -271,6 +294,17 @@ def _drift_of_many(system: System, parts: tuple[Floats, ...], cost: Floats | Non
         system.row_node, system.row_to_branches, system.target, system.probability, (paid, size), values
     )
     return total, system.rounding * weight + np.where(moved, np.diff(system.row_to_branches) * UNDERFLOW, 0.0)
+
+
+def _lost_to_rounding(system: System, parts: tuple[Floats, ...], one: float) -> Floats:
+    """Return what the drift along every row may miss as probabilities of faint branches were rounded, ``[m]``."""
+    row = np.searchsorted(system.row_to_branches, system.faint, side="right") - 1
+    own, target = system.row_node[row], system.target[system.faint]
+    lost = np.zeros(system.rows)
+    for number, part in enumerate(parts):
+        step = np.abs(padded(part, one if number == 0 else 0.0)[target] - part[own])
+        lost += np.bincount(row, UNDERFLOW * step, minlength=system.rows)
+    return lost
 
 
 def certain_drift(system: System, values: Floats) -> tuple[Floats, Bools]:

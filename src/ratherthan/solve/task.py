@@ -65,15 +65,17 @@ def task_of(goal: Goal, must_end: Bools | None = None) -> Task:
 
 def _least_cost(goal: Goal) -> Task:
     index, target, everywhere = goal.index, goal.target, goal.through
-    finite = graph.surely_reach(index, target, everywhere)
-    free = graph.surely_reach(index, target, finite, ~goal.costly)
-    open_ = finite & ~free
-    allowed = open_[index.choice_to_state] & graph.all_branches_in(index, finite)
-    component, internal = graph.end_components(index, open_, allowed & ~goal.costly)
-    attaining = (free & ~target)[index.choice_to_state] & ~goal.costly & graph.all_branches_in(index, free)
-    every = np.ones(index.choices, dtype=np.bool_)
-    level = graph.levels_to(index, finite, everywhere)
-    trying = graph.first_downhill(index, level, every)
+    sure = graph.surely_reaching(index, target, everywhere)
+    finite, free, attaining = sure.states, target, np.zeros(index.choices, dtype=np.bool_)
+    component, internal = np.full(index.states, -1, dtype=np.int64), attaining
+    open_, allowed = finite & ~target, sure.usable
+    if not goal.costly.all():
+        free = graph.surely_reach(index, target, finite, ~goal.costly)
+        attaining = (free & ~target)[index.choice_to_state] & ~goal.costly & graph.all_branches_in(index, free)
+        open_ = finite & ~free
+        allowed = allowed & open_[index.choice_to_state]
+        component, internal = graph.end_components(index, open_, allowed & ~goal.costly)
+    trying = graph.way_back(index, finite, everywhere)
     return Task(
         goal=goal,
         fixed=np.where(finite, 0.0, np.inf),
@@ -84,7 +86,8 @@ def _least_cost(goal: Goal) -> Task:
         arriving=finite & ~target,
         attaining=attaining,
         elsewhere=np.where(trying >= 0, trying, index.state_to_choices[:-1]),
-        can_arrive=graph.can_reach(index, target, everywhere),
+        can_arrive=sure.possible,
+        nearest=(sure.level, sure.order),
     )
 
 
@@ -115,8 +118,8 @@ def _most_cost(goal: Goal) -> Task:
 
 def _most_likely(goal: Goal) -> Task:
     index, target, through = goal.index, goal.target, goal.through
-    possible = graph.can_reach(index, target, through)
-    sure = graph.surely_reach(index, target, through)
+    found = graph.surely_reaching(index, target, through)
+    possible, sure = found.possible, found.states
     open_ = possible & ~sure
     allowed = open_[index.choice_to_state]
     component, internal = graph.end_components(index, open_, allowed)
@@ -128,7 +131,7 @@ def _most_likely(goal: Goal) -> Task:
         component=component,
         internal=internal,
         arriving=possible & ~target,
-        attaining=(sure & ~target)[index.choice_to_state] & graph.all_branches_in(index, sure),
+        attaining=found.usable,
         elsewhere=index.state_to_choices[:-1].astype(np.int64),
         can_arrive=possible,
     )

@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ratherthan.model import graph
-from ratherthan.model.index import build_index
+from ratherthan.model.index import branches_of, build_index
 from ratherthan.model.mdp import Bools, Floats
 from ratherthan.solve.goal import Goal, Kind, Task
 from ratherthan.solve.system import System
@@ -63,17 +63,22 @@ def fixed_best(task: Task) -> Bools:
     A value of 0 or 1 is had by choices that pay nothing and lead to that value only. Where no policy is sure to arrive all
     choices are the same; where there is no end to what can be gathered, those are best that may lead to such a state.
     """
-    goal = task.goal
-    index = goal.index
-    same = task.fixed[index.branch_to_target] == task.fixed[index.choice_to_state[index.branch_to_choice]]
-    leads = ~graph.any_branch_in_rows(index, ~same | task.open[index.branch_to_target])
-    infinite = graph.any_branch_in_rows(index, same)
+    goal, open_ = task.goal, task.open
+    index, running = goal.index, goal.running
+    best = ~running[index.choice_to_state]
+    choices, _ = branches_of(index.state_to_choices, np.flatnonzero(running & ~open_))
+    if not len(choices):
+        return best
+    branches, offsets = branches_of(index.choice_to_branches, choices)
+    value, after = task.fixed[index.choice_to_state[choices]], index.branch_to_target[branches]
+    same = task.fixed[after] == np.repeat(value, np.diff(offsets))
+    leads = np.logical_and.reduceat(same & ~open_[after], offsets[:-1])
+    infinite = np.logical_or.reduceat(same, offsets[:-1])
     if goal.kind is Kind.REWARD:
-        infinite &= ~graph.any_branch_in(index, task.fixed == -np.inf)
-    value = task.fixed[index.choice_to_state]
+        infinite &= ~np.logical_or.reduceat(task.fixed[after] == -np.inf, offsets[:-1])
     worst = goal.unreached if goal.kind is Kind.REWARD or not goal.maximise else np.nan
-    best = np.where(np.isinf(value), (value == worst) | infinite, leads & ~goal.costly)
-    return best & ~task.open[index.choice_to_state] | ~goal.running[index.choice_to_state]
+    best[choices] = np.where(np.isinf(value), (value == worst) | infinite, leads & ~goal.costly[choices])
+    return best
 
 
 def first_tied(task: Task, tied: Bools) -> Nodes:

@@ -1,119 +1,190 @@
 """A task with positive costs enters; its optimum leaves, found by windowed sweeps and proved by scaling. No equation is solved.
 
-Let v ≥ 0 be what the sweeps found (`windows`), D(a) its drift along row a, and c(a) > 0 what the row pays. The drift of (1 + h) v is
-(1 + h) D(a) - h c(a). So (1 - h) v passes ``never_falls`` as soon as h c(a) ≥ -D(a) along every row, which proves it a lower
-bound of every policy that arrives; and (1 + h) v passes ``never_rises`` along the rows of one policy as soon as h c(a) ≥ D(a) (1 + h)
-there. That policy then arrives with probability 1: (1 + h) v falls by at least the least cost at every step, and is never below 0.
-So both bounds are proved by one pass each over the rows, whatever the sweeps did, and the policy's value lies between the same two.
+The rows are those of the model itself, in the order in which the states are met from the goal on; loops of a row to its own state
+are taken out, and what is left is scaled to sum to 1: a row then says what leaving the state costs, and where to.
 
-Which h is tried follows from the largest D(a) / c(a). With a residual below 1e-8 of the least cost it is at most some 5e-8.
+**Proof.** Let v ≥ 0 be what the sweeps found (`windows`), D(a) its drift along row a (`system`), and c(a) > 0 what the row pays. The
+drift of (1 - h) v is (1 - h) D(a) + h c(a). So (1 - h) v ≤ cost + P (1 - h) v along every row as soon as h c(a) ≥ -D(a) along every
+row; every policy that arrives then costs at least (1 - h) v, as v is bounded and 0 at the goal (`certify`). And the drift of
+(1 + h) v is (1 + h) D(a) - h c(a): along the rows of one policy (1 + h) v does not rise as soon as h c(a) ≥ (1 + h) D(a) there. As
+(1 + h) v is nowhere negative and falls by at least the least cost at every step, that policy arrives with probability 1, and
+costs at most (1 + h) v. Which h it takes is told by one pass over the rows that trusts nothing: neither the sweeps nor the order.
 
-Rows are tied up to a gap of a few residuals, and the first listed of a state's tied choices is taken: what that loses is part of h.
+**Rounding.** Taken for D(a) is what makes the need larger, the drift as computed plus or less e(a) = 6 (k + 8) u · (c + Σ p |δ|) with
+k the branches of the longest row, loops included, δ the differences of v, and u = 2⁻⁵³: k u for the sum of p that leaves, by which
+cost and p are divided, 2 (k + 4) u as the model's p may miss 1 by that much, k u for the sum in r̄, (k + 3) u for the sum, the products
+and the differences. Products that underflow add 1e-322 each, and as much times δ for p that do. The bounds are rounded outward.
+
+With a residual of r in units of the least cost, h is at most some r. Rows are tied up to a gap of a few residuals, and the first
+listed of a state's tied choices is taken: what that loses is part of h.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from ratherthan.errors import LimitError
 from ratherthan.model import graph
-from ratherthan.model._kernels import is_compiled
-from ratherthan.model.mdp import Floats
-from ratherthan.solve.certify import never_falls, never_rises
+from ratherthan.model._kernels import LEAST_WORK, compiled, is_compiled
+from ratherthan.model.mdp import Bools, Floats, Ints
+from ratherthan.model.watch import current, keep, room_for, unlimited
+from ratherthan.solve._kernels import Needs, Swept, scaling_needs, sinks_first, swept_rows
 from ratherthan.solve.chain import Evaluated
 from ratherthan.solve.goal import Kind, Task
-from ratherthan.solve.optimum import Optimum
-from ratherthan.solve.system import System, drift, rows_of
-from ratherthan.solve.tied import fixed_best
-from ratherthan.solve.windows import Windows, sweep_windows
+from ratherthan.solve.optimum import Optimum, equations_of
+from ratherthan.solve.precise import precision_wanted
+from ratherthan.solve.system import ROUNDING
+from ratherthan.solve.tied import first_tied, fixed_best
+from ratherthan.solve.windows import Sweeping, Windows, begin_sweeps, sweep_on, widened
 
 __all__ = ["suits_windows", "windowed_optimum"]
 
-Nodes = npt.NDArray[np.int64]
 Progress = Callable[[str], None]
 
 FEWEST = 3000
-"""From how many nodes on windows are tried before equations: below, these are solved at once, and to the last digit."""
-WIDEST = 1e-7
-"""Up to which h the bounds are of use."""
+"""From how many states on windows are tried before equations: below, these are solved at once, and to the last digit."""
+SHARE, MOST = 0.05, 5e-8
+"""The residual to come to in units of the least cost: a share of the precision that is wanted, and how much it may be at most."""
+USEFUL = 2.0
+"""Up to how many such residuals h is of use."""
 TIE = 4.0
 """Up to how many residuals a row may fall behind the best and be tied."""
 ROOM = 1.0 + 1e-6
-TRIES = 3
-SETTINGS = Windows()
+TINY = 1e-15
+BYTES = 12, 16
+"""Of memory per branch, and per choice."""
+LARGE = 30_000_000
+"""From how many branches on memory counts more than some seconds."""
 
 
-def suits_windows(task: Task, core: System, whole: System) -> bool:
-    """Return whether windowed sweeps are worth a try: many states, a cost to be kept small, and all costs positive."""
-    goal = task.goal
-    if goal.kind is not Kind.COST or goal.maximise or goal.signed or core is not whole or core.nodes < FEWEST:
+def suits_windows(task: Task) -> bool:
+    """Return whether windowed sweeps are worth a try: many states, a cost to be kept small, and nothing that is free of charge."""
+    goal, index = task.goal, task.goal.index
+    if goal.kind is not Kind.COST or goal.maximise or goal.signed:
         return False
-    if len(core.target) > np.iinfo(np.int32).max:  # the sweeps count in 32 bits
+    if index.work > np.iinfo(np.int32).max or not is_compiled(index.work):  # the sweeps count in 32 bits
         return False
-    return is_compiled(len(core.target)) and bool(core.cost.min() > 0.0) and bool(np.isfinite(core.cost).all())
+    return int(np.count_nonzero(task.open)) >= FEWEST and bool((goal.costly | ~task.allowed).all())
 
 
-def windowed_optimum(
-    task: Task, core: System, settings: Windows = SETTINGS, progress: Progress | None = None
-) -> Optimum | None:
+def windowed_optimum(task: Task, settings: Windows | None = None, progress: Progress | None = None) -> Optimum | None:
     """Return the optimum of a task, None where the sweeps came to no end or nothing could be proved.
 
     Parameters
     ----------
     task : Task
         With `suits_windows`.
-    core : System
-        Its equations, a node for every open state.
-    settings : Windows
+    settings : Windows, optional
+        By default as fine as the precision that is wanted.
     progress : callable, optional
     """
-    found = sweep_windows(core, settings, progress)
-    if not found.converged:
+    settings = settings or Windows(residual=min(SHARE * precision_wanted(), MOST))
+    level, order = _nearest(task)
+    swept = _rows(task, order)
+    if not (swept.least > 0.0 and swept.largest < np.inf) or _without_cycles(swept):
         return None
-    if progress is not None:
-        progress("proving the bounds")
-    total, error = drift(core, found.values)
-    begin = core.node_to_rows[:-1]
-    least = np.minimum.reduceat(total, begin)
-    allowed = TIE * settings.residual * float(core.cost.min()) + 4.0 * error
-    near = total - least[core.row_node] <= allowed
+    state = begin_sweeps(level[order], swept.least, settings)
     tied = fixed_best(task)
-    tied[core.source[near]] = True
-    choice = np.where(task.open | task.arriving, graph.first_listed(task.goal.index, tied), task.elsewhere)
-    rows = _rows_taken(core, near)
-    below = _scaled(core, found.values, (error - total) / core.cost, never_falls, -1.0)
-    taken = rows_of(core, rows)
-    above = _scaled(taken, found.values, ((error + total) / core.cost)[rows], never_rises, 1.0)
-    if below is None or above is None:
-        return None
+    try:
+        needs = _swept(swept, state, tied, settings, progress)
+    except LimitError:
+        _keep(task, order, state)
+        raise
+    del swept  # what follows needs room
+    return None if needs is None else _proved(task, state, (order, tied), needs)
+
+
+def _nearest(task: Task) -> tuple[Ints, Ints]:
+    """Return how far from the target states are, and the open ones, the nearest first."""
+    index, target = task.goal.index, task.goal.target
+    if task.nearest is not None:
+        level, order = task.nearest
+        return level, order[task.open[order]]
+    level = graph.levels_to(index, target | (task.fixed == 0.0) & ~task.open, task.open, task.allowed)
+    open_ = np.flatnonzero(task.open)
+    return level, open_[np.argsort(level[open_], kind="stable")]
+
+
+def _rows(task: Task, order: Ints) -> Swept:
+    """Return the rows of the open states in an order."""
+    goal, index = task.goal, task.goal.index
+    room_for(BYTES[0] * index.work + BYTES[1] * index.choices, "The equations of this model")
+    rank: npt.NDArray[np.int32] = np.where(np.isfinite(task.fixed), np.int32(len(order)), np.int32(-1))
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    rows = index.state_to_choices, index.choice_to_branches, index.branch_to_target
+    if index.work > LARGE:
+        index.forget()
+    made: Swept = compiled(swept_rows, index.work)(rows, goal.probability, goal.cost, order, rank)
+    return made
+
+
+def _without_cycles(swept: Swept) -> bool:
+    """Return whether no state leads back to itself: then one backward pass does it (`layered`)."""
+    if swept.loops:
+        return False
+    rows = swept.rows
+    begin: Any = rows.row_to_branches[rows.node_to_rows]
+    target: Any = rows.target
+    return len(compiled(sinks_first, len(target))(begin, target)) > 0
+
+
+def _swept(
+    swept: Swept, state: Sweeping, tied: Bools, settings: Windows, progress: Progress | None
+) -> tuple[float, float, float] | None:
+    """Sweep until it can be proved; return by what share values must be made smaller and larger, and the residual, or None."""
+    limits = (TIE * settings.residual * swept.least, (swept.longest + 8) * ROUNDING)
+    while sweep_on(swept.rows, state, settings, progress):
+        before = state.residual
+        needs: Needs = compiled(scaling_needs, max(len(swept.rows.target), LEAST_WORK))(
+            swept.rows, swept.source, state.values, limits, tied
+        )
+        state.residual = needs.residual
+        shares = _shares(needs, state.values)
+        if shares is not None and max(shares[:2]) <= USEFUL * settings.residual:
+            return shares
+        if needs.residual <= settings.residual * swept.least or not widened(state, before):
+            break
+    return None
+
+
+def _shares(needs: Needs, values: Floats) -> tuple[float, float, float] | None:
+    """Return the h of the lower and of the upper bound, and the residual, None where there are none."""
+    below = needs.below * ROOM + TINY
+    above = needs.above / (1.0 - needs.above) * ROOM + TINY if needs.above < 0.5 else np.inf
+    sound = bool(np.isfinite(values).all()) and float(values.min()) >= 0.0
+    return (below, above, needs.residual) if sound and below < 0.5 and above < 0.5 else None
+
+
+def _proved(task: Task, state: Sweeping, found: tuple[Ints, Bools], shares: tuple[float, float, float]) -> Optimum:
+    """Return the optimum on all states."""
+    order, tied = found
+    part, (below, above, residual) = state.values[: len(order)], shares
     values, lower, upper = (task.fixed.copy() for _ in range(3))
-    for whole, part in ((values, found.values), (lower, below), (upper, above)):
-        whole[task.open] = part
-    attained = Evaluated(
-        values=values, lower=lower, upper=upper, open=task.open, lost=np.zeros(len(values), dtype=np.bool_), solves=0
-    )
-    residual = float(np.abs(least).max())
-    sweeps = round(found.visits)
+    values[order] = part
+    lower[order] = np.maximum(np.nextafter((1.0 - below) * part, -np.inf), 0.0)
+    upper[order] = np.nextafter((1.0 + above) * part, np.inf)
+    first = graph.first_listed(task.goal.index, tied)
+    choice = np.where(task.open | task.arriving, first, task.elsewhere)
+    free = task.arriving & ~task.open
+    if free.any():  # from there the goal costs nothing: nor does going round
+        arriving = first_tied(task, tied & task.open[task.goal.index.choice_to_state] | task.attaining)
+        choice = np.where(free, arriving, choice)
+    lost = np.zeros(len(values), dtype=np.bool_)
+    attained = Evaluated(values=values, lower=lower, upper=upper, open=task.open, lost=lost, solves=0)
+    sweeps = round(state.visits / len(order))
     return Optimum(values, lower, upper, choice, tied, attained, "windowed sweeps", sweeps, residual, task)
 
 
-def _rows_taken(core: System, near: npt.NDArray[np.bool_]) -> Nodes:
-    """Return the first listed tied row of each node."""
-    candidates = np.flatnonzero(near)
-    first: Nodes = candidates[np.searchsorted(candidates, core.node_to_rows[:-1])]
-    return first
-
-
-def _scaled(system: System, values: Floats, need: Floats, passes: Callable[..., bool], sign: float) -> Floats | None:
-    """Return (1 + sign · h) · values with an h that passes the check, None where none does that is of use."""
-    share = max(float(need.max()), 0.0) * ROOM + 1e-15
-    for _ in range(TRIES):
-        if not share <= WIDEST:
-            return None
-        moved = (1.0 + sign * share) * values
-        if passes(system, moved):
-            return moved
-        share *= 2.0
-    return None
+def _keep(task: Task, order: Ints, state: Sweeping) -> None:
+    """Lay down what is known when a limit stops the sweeps."""
+    if current().board.kept.get("task") is not task:
+        return
+    with unlimited():
+        equations = equations_of(task)
+    guess = np.empty(len(task.open))
+    guess[order] = state.values[: len(order)]
+    keep(equations=equations, system=equations.core, guess=guess[task.open], engine="windowed sweeps")

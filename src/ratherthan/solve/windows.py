@@ -1,17 +1,20 @@
-"""A system of positive costs enters, nearly its optimum leaves: sweeps through windows of layers, as maps want them.
+"""Rows with positive costs enter, nearly their optimum leaves: sweeps through windows of layers, as maps want them.
 
-On a map the values of far places rest on those of near ones. Let the nodes lie in layers, by their distance from the sinks in
-steps, and solve a *window* of some dozens of layers until it is quiet; then move on by half a window. Values beyond
+On a map the values of far places rest on those of near ones. Let the nodes lie in layers, by their distance from the goal in
+steps, and solve a *window* of some dozens of layers until it is quiet; then move on by three quarters of a window. Values beyond
 the window are looked at, but hardly matter yet; and slow pockets are quiet before anything that rests on them is touched.
-Every node is swept some sixty times, while it lies in the cache, whereas sweeps over the whole map would have to be as many as
+Every node is swept some forty times, while it lies in the cache, whereas sweeps over the whole map would have to be as many as
 it has layers. A sweep in place takes the best row of every node (Gauss-Seidel); some more keep to what was taken, and cost a
 row each (modified policy iteration, Puterman and Shin 1978). Loops of a row to its own node are taken out beforehand.
 
-The passes are repeated, each with a finer tolerance and where that gains little with wider windows, until the residual
-max |Tv - v| is small against the least cost. It gives up when it has visited every node more often than it was allowed: where
-everything rests on everything, as in random walks, windows do not help, and equations are solved instead.
+The first pass is a fine one: as a window is quiet to a millionth of the least cost before the next one begins, one pass mostly is
+enough. Else there are more, each with a finer tolerance and, where that gains little, with wider windows.
 
-Nothing here needs to be right for a bound to be sound: what leaves is a guess, and the check decides (`certify`).
+**Giving up.** Where everything rests on everything, as in random walks, windows do not help, and other methods are better. What is
+left to do is guessed from what was done: a window whose sweeps gain so little, or a pass that comes forward so slowly, that
+every node would be visited more often than is allowed, ends it at once; so do passes that gain nothing in windows as wide as can be.
+
+Nothing here needs to be right for a bound to be sound: what leaves is a guess, and the check decides (`windowed`).
 
 References
 ----------
@@ -23,23 +26,32 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from math import log
 
 import numpy as np
+import numpy.typing as npt
 
-from ratherthan.model import graph
-from ratherthan.model._kernels import compiled
-from ratherthan.model.mdp import Floats
-from ratherthan.solve._kernels import ordered_rows, window_pass, window_residual
-from ratherthan.solve.system import System
+from ratherthan.model._kernels import LEAST_WORK, compiled
+from ratherthan.model.mdp import Floats, Ints
+from ratherthan.model.watch import look
+from ratherthan.solve._kernels import Ordered, window_sweeps
 
-__all__ = ["Windowed", "Windows", "sweep_windows"]
+__all__ = ["Sweeping", "Windows", "begin_sweeps", "sweep_on", "widened"]
 
 Progress = Callable[[str], None]
 
-MOST_PASSES = 12
 STEP = 1.3
 """What a node is guessed to cost more than the nearest one behind it, in units of the least cost."""
+SLICE = 4_000_000
+"""How many branches a kernel visits between two looks at the limits, some tenths of a second."""
+FIRST = 1e-6
+"""The tolerance of the first pass, in units of the least cost."""
+FAR = 0.1
+"""What share of the layers must be behind before it is guessed from them how long a pass takes."""
+PATIENCE = 30
+"""After how many visits of its nodes it is guessed how long a window takes."""
+POOR = 0.1
+"""To what share a pass must bring the residual down."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,58 +68,136 @@ class Windows:
         How many visits of each node on average are allowed.
     """
 
-    width: int = 80
-    residual: float = 1e-8
+    width: int = 40
+    residual: float = 5e-8
     most: int = 400
 
 
-class Windowed(NamedTuple):
-    """Where the sweeps came to: values, visits per node, and whether they converged."""
-
-    values: Floats  # [n]
-    visits: float
-    converged: bool
-
-
-def sweep_windows(system: System, settings: Windows, progress: Progress | None = None) -> Windowed:
-    """Return nearly the least expected costs of a system.
+@dataclass(kw_only=True, eq=False)
+class Sweeping:
+    """Where the sweeps are.
 
     Parameters
     ----------
-    system : System
+    values : array of float, ``[n+2]``
+        Those of the nodes in the order of the layers, and of the two sinks.
+    taken : array of int, ``[n]``
+        The row taken at each node.
+    layers : array of int
+        Where each layer begins, and the end of the last.
+    least : float
+        The least cost.
+    tolerance, residual : float
+        Of the pass to come, and of the values now.
+    width, visits, passes : int
+        Of windows; and what was done so far.
+    """
+
+    values: Floats  # [n+2]
+    taken: npt.NDArray[np.int32]  # [n]
+    layers: npt.NDArray[np.int64]
+    least: float
+    tolerance: float
+    width: int
+    residual: float = float("inf")
+    visits: int = 0
+    passes: int = 0
+
+    @property
+    def nodes(self) -> int:
+        """How many nodes there are."""
+        return len(self.taken)
+
+
+def begin_sweeps(level: Ints, least: float, settings: Windows) -> Sweeping:
+    """Return sweeps that have not begun.
+
+    Parameters
+    ----------
+    level : array of int, ``[n]``
+        The distance of each node, ascending.
+    least : float
+        The least cost of a row.
+    settings : Windows
+    """
+    n = len(level)
+    borders = np.flatnonzero(level[1:] != level[:-1]) + 1
+    layers = np.concatenate([[0], borders, [n]]).astype(np.int64)
+    values = np.zeros(n + 2)
+    values[n + 1] = 1.0
+    return Sweeping(
+        values=values,
+        taken=np.zeros(n, dtype=np.int32),
+        layers=layers,
+        least=least,
+        tolerance=FIRST * least,
+        width=settings.width,
+    )
+
+
+def sweep_on(rows: Ordered, state: Sweeping, settings: Windows, progress: Progress | None = None) -> bool:
+    """Pass once more over all windows, each finer than before; return whether that came to its end.
+
+    Parameters
+    ----------
+    rows : Ordered
         All costs are positive, and a sink can be reached from every node.
+    state : Sweeping
+        Leaves with better values; its residual is the caller's to tell.
     settings : Windows
     progress : callable, optional
         Told now and then how far it is.
     """
-    n = system.nodes
-    sinks = np.arange(n + 2) >= n
-    level = graph.levels_to(system.index, sinks, ~sinks)[:n]
-    order = np.argsort(level, kind="stable")
-    rank = np.arange(n + 2)
-    rank[order] = np.arange(n)
-    layers = np.concatenate([[0], np.cumsum(np.bincount(level - 1))])
-    rows = compiled(ordered_rows, len(system.target))(
-        (system.node_to_rows, system.row_to_branches, system.target), system.probability, system.cost, order, rank
-    )
-    values, taken = np.zeros(n + 2), np.zeros(n, dtype=np.int32)
-    values[n + 1] = 1.0
-    least = float(system.cost.min())
-    wanted, left, width = settings.residual * least, settings.most * n, settings.width
-    tolerance, step, residual = 1e-3 * least, STEP * least, np.inf
-    kernel = compiled(window_pass, len(system.target))
-    for number in range(1, MOST_PASSES + 1):
-        left -= kernel(rows, layers, values, taken, width, tolerance, step, left)
-        if left < 0:
-            break
-        before, residual = residual, float(compiled(window_residual, len(system.target))(rows, values))
+    last, n = len(state.layers) - 1, state.nodes
+    if state.passes > 0:
+        state.tolerance = max(0.3 * settings.residual * state.least, 0.01 * state.tolerance)
+    spans = (state.width, max(state.width - max(state.width // 4, 1), 1))
+    wanted = (state.tolerance, STEP * state.least if state.passes == 0 else 0.0)
+    at, begun, work = np.zeros(2, dtype=np.int64), state.visits, 0
+    seen: list[tuple[int, float]] = []  # the visits of the window that is being swept, and the last change
+    kernel, slice_ = compiled(window_sweeps, max(len(rows.target), LEAST_WORK)), SLICE // max(len(rows.target) // n, 1)
+    state.passes += 1
+    while at[0] < last:
+        layer, budget = int(at[0]), min(slice_, settings.most * n - state.visits)
+        spent, change = kernel(rows, state.layers, state.values, state.taken, at, spans, wanted, budget)
+        state.visits += spent
+        told = f"windowed sweeps, pass {state.passes}: {int(at[0])} of {last} layers"
+        look(told)
         if progress is not None:
-            progress(f"windowed sweeps, pass {number}: residual {residual:.1e}")
-        if residual <= wanted or not np.isfinite(residual):
+            progress(told)
+        if at[0] == last:
             break
-        if residual > 0.1 * before:
-            width *= 2
-        step, tolerance = 0.0, max(0.3 * wanted, 0.01 * tolerance)
-    found = np.empty(n)
-    found[order] = values[:n]
-    return Windowed(found, settings.most - left / n, bool(residual <= wanted))
+        if at[0] == layer:
+            work += spent
+            seen.append((work, change))
+        else:
+            work, seen = 0, []
+        done = state.layers[at[0]] / n
+        left = (state.visits - begun) * (1.0 / done - 1.0) if done > FAR else 0.0
+        if work > PATIENCE * (state.layers[min(layer + state.width, last)] - state.layers[layer]):
+            left = max(left, _visits_left(seen, state.tolerance))
+        if not state.visits + left <= settings.most * n or np.isnan(change):
+            return False
+    return True
+
+
+def _visits_left(seen: list[tuple[int, float]], tolerance: float) -> float:
+    """Return how much work it takes to come to a tolerance, if it goes on as it did in the later half of the work so far."""
+    work, change = seen[-1]
+    if len(seen) == 1:  # nothing to compare it with: no guess
+        return 0.0
+    before, larger = next((entry for entry in reversed(seen) if 2 * entry[0] <= work), seen[0])
+    if change <= tolerance:
+        return 0.0
+    return log(tolerance / change) / log(change / larger) * (work - before) if change < larger else np.inf
+
+
+def widened(state: Sweeping, before: float) -> bool:
+    """Make windows wider where a pass gained little; return whether another pass may help."""
+    if not np.isfinite(state.residual):
+        return False
+    if state.residual > POOR * before:
+        if state.width >= len(state.layers):
+            return False
+        state.width *= 2
+    return True

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ratherthan.model.compiling import is_compiled
 from ratherthan.model.mdp import Floats
 from ratherthan.verify.equations import ROUNDING, Core, Pair, Rows
 from ratherthan.verify.frame import Array
+from ratherthan.verify.settling import Judge, offered
 
 __all__ = ["Budget", "search"]
 
 Solver = Callable[[Floats], Floats]
-Judge = Callable[[Pair, Array | None], tuple[bool, bool]]
 
 DENSE = 400
-SHIFT = 4e-12
-EASY = 20_000_000
+EASY, LARGE = 20_000_000, 50_000
+"""What needs more numbers than this, or has more entries, is swept before anything is solved."""
 BETWEEN = 100
 FINE_ROUNDS = 6
 MOST_ROUNDS = 30
@@ -36,7 +36,7 @@ class Budget:
     exact : int
         Up to so many open states are solved in exact fractions.
     sweeps : int
-        Value iteration is given up where it would need more sweeps than this.
+        Sweeps in which it is looked for where more and more can be gathered.
     rounds : int
         Linear solves of policy iteration.
     fill : int
@@ -65,15 +65,14 @@ def search(core: Core, budget: Budget, judge: Judge) -> Array | None:
     array of int, ``[n]``, or None
         The rows of a policy that looks better than all, but never leaves the open states from some node.
     """
-    rows, fill = None, _fill(core) if core.count > DENSE else 0
-    if fill > EASY:
-        sweeper = _Sweeper.of(core)
-        y = sweeper.converged(core.rows.price, np.zeros(core.count), SHIFT / 20, budget.sweeps)
-        if y is not None:
-            rows = sweeper.best(core.rows.price, y)
-            if _iterated(sweeper, y, rows, budget, judge):
-                return None
-    return _solved(core, rows, budget, judge) if fill <= budget.fill else None
+    entries = len(core.rows.target)
+    large = core.count > DENSE and entries >= LARGE and is_compiled(entries)
+    fill = _fill(core) if core.count > DENSE and not large else 0
+    if (large or fill > EASY) and offered(core, judge):
+        return None
+    if large:
+        fill = _fill(core)
+    return _solved(core, budget, judge) if fill <= budget.fill else None
 
 
 def _toward(core: Core) -> float:
@@ -106,30 +105,9 @@ class _Sweeper:
             outside=np.add.reduceat(away, rows.first),
         )
 
-    def narrowed(self, rows: Array) -> _Sweeper:
-        """Return the sweeps of one row per node."""
-        return _Sweeper(core=self.core.narrowed(rows), matrix=self.matrix[rows], outside=self.outside[rows])
-
     def best(self, price: Floats, y: Floats) -> Array:
         """Return the best row of each node."""
         return self.core.best(self.outside + price / self.core.leaving + self.matrix @ y)
-
-    def converged(self, price: Floats, y: Floats, near: float, most: int) -> Floats | None:
-        """Return what sweeps from `y` converge to, up to relative steps `near`; None where this takes more than `most`."""
-        core, fixed, before = self.core, self.outside + price / self.core.leaving, math.inf
-        reduce = np.maximum.reduceat if core.problem.frame.maximise else np.minimum.reduceat
-        for sweep in range(1, most + 1):
-            z = reduce(fixed + self.matrix @ y, core.begin)
-            change = float((np.abs(z - y) / np.maximum(core.sizes(z), 1e-300)).max()) if sweep % 10 == 0 else math.inf
-            y = z
-            if change <= near:
-                return np.asarray(y)
-            if sweep % 200 == 0:
-                left = math.log(near / change) / math.log(max(change / before, 1e-9)) if change < before else math.inf
-                if math.isfinite(before) and 200 * left > most - sweep:
-                    return None
-                before = change
-        return None
 
     def swept(self, price: Floats, y: Floats, times: int) -> Array:
         """Return the best rows after some sweeps from `y`."""
@@ -140,23 +118,9 @@ class _Sweeper:
         return self.best(price, y)
 
 
-def _iterated(sweeper: _Sweeper, y: Floats, rows: Array, budget: Budget, judge: Judge) -> bool:
-    """Offer what value iteration converges to with shifted prices; return whether that is enough."""
-    core = sweeper.core
-    shift = _toward(core) * SHIFT * core.sizes(y)[core.owner] * core.leaving
-    bound = sweeper.converged(core.rows.price + shift, y, SHIFT / 3, budget.sweeps)
-    rest = np.zeros(core.count)
-    if bound is None or not judge((bound, rest), None)[0]:
-        return False
-    followed = sweeper.narrowed(rows)
-    reached = followed.converged((core.rows.price - shift)[rows], y, SHIFT / 3, budget.sweeps)
-    return reached is not None and judge((reached, rest), rows)[1]
-
-
-def _solved(core: Core, rows: Array | None, budget: Budget, judge: Judge) -> Array | None:
+def _solved(core: Core, budget: Budget, judge: Judge) -> Array | None:
     """Offer what policy iteration finds, moved apart by margins that grow until the checks pass."""
-    if rows is None or not core.absorbed(rows):
-        rows = core.outward_rows()
+    rows = core.outward_rows()
     found = None if rows is None else _policy_iteration(core, rows, budget.rounds)
     if found is None or isinstance(found, np.ndarray):
         return found

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from ratherthan.model.mdp import Bools
+from ratherthan.verify.around import Around, around
 from ratherthan.verify.frame import Array, Frame
 from ratherthan.verify.groups import Critical
 from ratherthan.verify.interval import Bounds, never_above, order_all
@@ -22,7 +22,7 @@ from ratherthan.verify.values import Band
 __all__ = ["Counts", "Tree"]
 
 LARGE = 20_000
-"""From so many branches on, searches without settings are done by a library."""
+"""From so many branches on, searches without settings share what they have in common (`ratherthan.verify.around`)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,15 +60,31 @@ class Counts:
     def count(self, choice: int) -> tuple[Bounds, Bounds, Bounds]:
         """Return ε of a choice, and within which bounds its bounds should lie in an explanation, and must lie."""
         if choice not in self._counts:
-            least = self._search(choice, sure=True)
-            most = self._search(choice, sure=False) if self.tree.toward_goal else least
-            weight = np.diff(self.frame.mdp.state_to_choices)
+            low, high = self._sums(choice)
             own, admitted, excused = (
-                Bounds(float((weight * found.sure)[least].sum()), float((weight * found.maybe)[most].sum()))
-                for found in (self.critical, self.admitted, self.excused)
+                Bounds(float(low[k]), float(high[k + 1])) for k in range(0, self._weights.shape[1], 2)
             )
             self._counts[choice] = own, admitted, excused
         return self._counts[choice]
+
+    @cached_property
+    def _weights(self) -> Array:
+        """|A(u)| of what is surely and of what may be critical: for oneself, as admitted and as excused, ``[S, 6]``."""
+        weight = np.diff(self.frame.mdp.state_to_choices)
+        groups = (self.critical, self.admitted, self.excused)
+        masks = [mask for found in groups for mask in (found.sure, found.maybe)]
+        return np.stack([weight * mask for mask in masks], axis=1).astype(np.int64)
+
+    def _sums(self, choice: int) -> tuple[Array, Array]:
+        """Return the sums of the weights over the search tree: where branches are sure to be followed, and where they may be."""
+        mdp = self.frame.mdp
+        if self.tree == Tree() and mdp.branches > LARGE:
+            first = np.unique(mdp.branch_to_target[mdp.branches_of(choice)]).astype(np.int64)
+            found = self._around.sums(int(self.frame.row_state[choice]), first, self._weights)
+            return found, found
+        least = self._search(choice, sure=True)
+        most = self._search(choice, sure=False) if self.tree.toward_goal else least
+        return self._weights[least].sum(axis=0), self._weights[most].sum(axis=0)
 
     @cached_property
     def _counts(self) -> dict[int, tuple[Bounds, Bounds, Bounds]]:
@@ -79,8 +95,6 @@ class Counts:
         mdp, frame = self.frame.mdp, self.frame
         root = int(frame.row_state[choice])
         first = np.unique(mdp.branch_to_target[mdp.branches_of(choice)]).astype(np.int64)
-        if self.tree == Tree() and mdp.branches > LARGE:
-            return self._search_large(root, first)
         found = np.zeros(mdp.states, dtype=np.bool_)
         layer = first[first != root]
         depth = 0
@@ -96,28 +110,11 @@ class Counts:
         return found
 
     @cached_property
-    def _graph(self) -> Any:
-        """The branches of all running states as a sparse matrix."""
-        from scipy.sparse import csr_array
-
+    def _around(self) -> Around:
+        """The graph of all branches of running states, prepared for many searches."""
         mdp = self.frame.mdp
         origin, target = self.frame.branches_from(np.flatnonzero(self.frame.running))
-        first = np.concatenate([[0], np.cumsum(np.bincount(origin, minlength=mdp.states))])
-        return csr_array((np.ones(len(target)), target, first), shape=(mdp.states, mdp.states))
-
-    def _search_large(self, root: int, first: Array) -> Bools:
-        """Do the same by a library: what is reached from s if it has this choice alone, without s itself."""
-        from scipy.sparse.csgraph import breadth_first_order
-
-        graph = self._graph
-        own = slice(int(graph.indptr[root]), int(graph.indptr[root + 1]))
-        before = graph.indices[own].copy()
-        graph.indices[own] = np.resize(first, len(before))
-        found = np.zeros(self.frame.mdp.states, dtype=np.bool_)
-        found[breadth_first_order(graph, root, return_predecessors=False)] = True
-        graph.indices[own] = before
-        found[root] = False
-        return found
+        return around(mdp.states, origin, target)
 
     def _better(self, origin: Array, target: Array, *, sure: bool) -> Bools:
         """Return which branches lead to a strictly better value."""

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 from ratherthan.errors import ExplanationError, InputError
 from ratherthan.explain.explanation import Explanation, Measured, Step, Tally, Unfolded
 from ratherthan.explain.question import Question
-from ratherthan.explain.record import digest, from_document, to_document
+from ratherthan.explain.record import digest, frame_of, from_document
 from ratherthan.model.mdp import MDP
 from ratherthan.model.problem import Problem
 from ratherthan.narrate import narrate
@@ -22,6 +22,7 @@ OUTCOMES = (
     "The values are proved: one check by Bellman's operator confirmed the bounds.",
     "Only the lower bounds are proved.",
     "Only the upper bounds are proved.",
+    "The lower bounds are proved; from above only what plans of a limited number of steps attain, and beyond that nothing.",
     "The solver stopped before it converged; the bounds that were proved so far are given.",
     "The values are not certified: no bounds are known, and no claim rests on them.",
 )
@@ -66,10 +67,11 @@ def load(source: Mapping[str, Any] | str | Path) -> tuple[Explanation, str]:
     for where, number in _integers(explanation):
         if type(number) is not int:
             refuse(f"A state, choice or count must be a whole number at {where}", repr(number))
-    missing = {state for where, state in _states(explanation) if where != "policy"} - set(explanation.states)
+    missing = {state for _, state in _states(explanation)} - set(explanation.states)
     if missing:
         refuse("Every state that is mentioned must have a record", f"none of state {min(missing)}")
-    _refuse_difference(document, to_document(explanation, text), "")
+    bare = dict(document) | {"policy": {**document["policy"], "choices": []}}
+    _refuse_difference(bare, frame_of(explanation, text) | {"digest": own}, "")
     _refuse_contradictions(explanation)
     return explanation, text
 
@@ -123,13 +125,11 @@ def _integers(told: Explanation) -> Iterator[tuple[str, object]]:
         yield "unfolded.memories", told.unfolded.memories
     yield "closing.off_route", told.closing.off_route
     yield "closing.off_route_open", told.closing.off_route_open
-    for state, choice, _ in told.policy.choices:
-        yield "policy", state
-        yield "policy", choice
     for record in told.states.values():
         yield from (("states", number) for number in record.place or ())
     for step in told.steps:
         yield from (("steps", number) for number in (step.state, step.choice, step.choice_index))
+        yield from (("alternatives", other.towards) for other in step.alternatives)
         for claim in step.claims:
             yield "claims", claim.level
             for row in (claim.evidence.taken, *claim.evidence.others):
@@ -190,6 +190,11 @@ def refuse_foreign(told: Explanation, problem: Problem) -> None:
     for where, state in _states(told):
         if not 0 <= state < mdp.states:
             refuse(f"A state must be a number from 0 to {mdp.states - 1} at {where}", state, state=state)
+    listed = told.policy.rows.state
+    foreign = listed[(listed < 0) | (listed >= mdp.states)]
+    if len(foreign):
+        state = int(foreign[0])
+        refuse(f"A state must be a number from 0 to {mdp.states - 1} at policy", state, state=state)
     for state, record in told.states.items():
         place = None if problem.world is None else problem.world.place(state)
         name, named = mdp.names[state], mdp.names.named
@@ -228,9 +233,9 @@ def _states(told: Explanation) -> Iterator[tuple[str, int]]:
     yield "start", told.start
     for name in ("route", "circle", "in_the_way", "states"):
         yield from ((name, state) for state in getattr(told, name))
-    yield from (("policy", state) for state, _, _ in told.policy.choices)
     for step in told.steps:
         yield "steps", step.state
+        yield from (("alternatives", other.towards) for other in step.alternatives)
         for claim in step.claims:
             yield from (("claims", state) for state, _, _ in claim.evidence.follows)
 

@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ratherthan.model.compiling import compiled, is_compiled
 from ratherthan.model.mdp import Bools, Floats
+from ratherthan.verify._kernels import drifts
 from ratherthan.verify.frame import Array, Frame, slices
 
 __all__ = ["Core", "Open", "Pair", "Rows", "core_of", "leaves", "rows_of"]
@@ -62,13 +64,24 @@ class Rows:
 
         The error is relative to the differences, not to the values: the small `rest` is kept apart for that.
         """
+        drift, size = self._drift(x, rest)
+        degree = np.diff(np.append(self.first, len(self.target)))
+        error = (2 * degree + 20) * ROUNDING * size + np.where(size > 0.0, degree * 1e-320, 0.0) + self.blur
+        return drift, error
+
+    def _drift(self, x: Floats, rest: Floats | None) -> tuple[Floats, Floats]:
+        """Return D, and the sum of the sizes of all that it was added up of."""
+        if is_compiled(len(self.target)):
+            rows = self.source, self.first, self.target
+            rest = np.zeros_like(x) if rest is None else rest
+            return compiled(drifts, len(self.target))(rows, self.share, self.price, float(self.fading), x, rest)
         origin = self.source[self.entry_row]
         apart = x[self.target] - x[origin]
         size = np.abs(apart)
         if rest is not None:
             further = rest[self.target] - rest[origin]
             apart, size = apart + further, size + np.abs(further)
-        drift = self.price + np.add.reduceat(self.share * apart, self.first)
+        drift: Floats = self.price + np.add.reduceat(self.share * apart, self.first)
         size = np.abs(self.price) + np.add.reduceat(self.share * size, self.first)
         if self.fading:
             ending = self.fading * x[self.source]
@@ -76,9 +89,7 @@ class Rows:
             if rest is not None:
                 ending = self.fading * rest[self.source]
                 drift, size = drift - ending, size + np.abs(ending)
-        degree = np.diff(np.append(self.first, len(self.target)))
-        error = (2 * degree + 20) * ROUNDING * size + np.where(size > 0.0, degree * 1e-320, 0.0) + self.blur
-        return drift, error
+        return drift, size
 
     def priced(self, price: Floats) -> Rows:
         """Return the same rows at another price, which is taken as it is."""

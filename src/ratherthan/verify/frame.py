@@ -16,11 +16,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
-from ratherthan.model.mdp import MDP, Bools, Floats
+from ratherthan.model.compiling import compiled, is_compiled
+from ratherthan.model.mdp import MDP, Bools, Floats, Ints
+from ratherthan.model.watch import look
+from ratherthan.verify._kernels import reached_back
 from ratherthan.verify.prices import Prices
 
 __all__ = ["Array", "Frame", "parts", "slices"]
@@ -40,6 +44,52 @@ def slices(first: Array, last: Array) -> Array:
     skipped = np.repeat(first - np.concatenate([[0], np.cumsum(counts)[:-1]]), counts)
     result: Array = skipped + np.arange(total)
     return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """What all frames on a model have in common; it is made once."""
+
+    states: int
+    state_to_choices: Ints
+    choice_to_branches: Ints
+    branch_to_target: Ints
+    branch_to_probability: Floats
+
+    @cached_property
+    def row_state(self) -> Array:
+        """The state of each choice, ``[C]``."""
+        return np.repeat(np.arange(self.states), np.diff(self.state_to_choices)).astype(np.int64, copy=False)
+
+    @cached_property
+    def entry_row(self) -> Array:
+        """The choice of each branch, ``[B]``."""
+        degree = np.diff(self.choice_to_branches)
+        return np.repeat(np.arange(len(degree)), degree).astype(np.int64, copy=False)
+
+    @cached_property
+    def share(self) -> Floats:
+        """The probabilities of the branches, rows summing to 1, ``[B]``."""
+        sums = np.add.reduceat(self.branch_to_probability, self.choice_to_branches[:-1])
+        return np.asarray(self.branch_to_probability / sums[self.entry_row], dtype=np.float64)
+
+    @cached_property
+    def rows_by_target(self) -> tuple[Array, Array]:
+        """The choices with a branch into each state, and where those of each state begin."""
+        order = np.argsort(self.branch_to_target, kind="stable")
+        count = np.bincount(self.branch_to_target, minlength=self.states)
+        return self.entry_row[order], np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+
+
+_shapes: WeakKeyDictionary[MDP, _Shape] = WeakKeyDictionary()
+
+
+def _shape_of(mdp: MDP) -> _Shape:
+    found = _shapes.get(mdp)
+    if found is None:
+        arrays = mdp.state_to_choices, mdp.choice_to_branches, mdp.branch_to_target, mdp.branch_to_probability
+        found = _shapes[mdp] = _Shape(mdp.states, *arrays)
+    return found
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,15 +125,15 @@ class Frame:
     ending: bool = False
     permitted: Bools | None = None  # [C]
 
-    @cached_property
+    @property
     def row_state(self) -> Array:
         """The state of each choice, ``[C]``."""
-        return np.repeat(np.arange(self.mdp.states), np.diff(self.mdp.state_to_choices)).astype(np.int64)
+        return _shape_of(self.mdp).row_state
 
-    @cached_property
+    @property
     def entry_row(self) -> Array:
         """The choice of each branch, ``[B]``."""
-        return np.repeat(np.arange(self.mdp.choices), np.diff(self.mdp.choice_to_branches)).astype(np.int64)
+        return _shape_of(self.mdp).entry_row
 
     @cached_property
     def usable(self) -> Bools:
@@ -138,11 +188,10 @@ class Frame:
             return np.ones(self.mdp.states, dtype=np.bool_)
         return self.reach(self.target, self.running)
 
-    @cached_property
+    @property
     def share(self) -> Floats:
         """The probabilities of the branches, rows summing to 1, ``[B]``."""
-        sums = np.add.reduceat(self.mdp.branch_to_probability, self.mdp.choice_to_branches[:-1])
-        return np.asarray(self.mdp.branch_to_probability / sums[self.entry_row], dtype=np.float64)
+        return _shape_of(self.mdp).share
 
     @cached_property
     def price(self) -> Floats:
@@ -159,17 +208,10 @@ class Frame:
         """Which choices pay something, ``[C]``."""
         return np.zeros(self.mdp.choices, dtype=np.bool_) if self.prices is None else self.prices.pays
 
-    @cached_property
-    def _into(self) -> tuple[Array, Array]:
-        """The branches sorted by their target, and where those of each target begin."""
-        order = np.argsort(self.mdp.branch_to_target, kind="stable").astype(np.int64)
-        first = np.searchsorted(self.mdp.branch_to_target[order], np.arange(self.mdp.states + 1)).astype(np.int64)
-        return order, first
-
     def rows_into(self, states: Array) -> Array:
         """Return the choices with a branch into `states` (some more than once)."""
-        order, first = self._into
-        return self.entry_row[order[slices(first[states], first[states + 1])]]
+        row, first = _shape_of(self.mdp).rows_by_target
+        return row[slices(first[states], first[states + 1])]
 
     def branches_from(self, states: Array) -> tuple[Array, Array]:
         """Return origin and target of every branch of every choice of some states."""
@@ -195,7 +237,14 @@ class Frame:
 
     def reach(self, to: Bools, via: Bools, rows: Bools | None = None) -> Bools:
         """Return the states of `to`, and those of `via` from which it can be reached through `via`, ``[S]``."""
-        seen = to.copy()
+        look()
+        seen, mdp = to.copy(), self.mdp
+        if is_compiled(mdp.branches):
+            allowed = np.ones(mdp.choices, dtype=np.bool_) if rows is None else rows
+            queue = np.zeros(mdp.states, dtype=np.int64)
+            run = compiled(reached_back, mdp.branches)
+            run(_shape_of(mdp).rows_by_target, self.row_state, allowed, via, seen, queue)
+            return seen
         frontier = np.flatnonzero(to)
         while len(frontier):
             into = self.rows_into(frontier)

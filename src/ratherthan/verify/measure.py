@@ -6,6 +6,7 @@ smallest and the largest of what it is taken of, so equal values have that value
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -156,7 +157,10 @@ class Measures:
         return self._wider(GROSS, self.coarse(slack))
 
     def _wider(self, share: float, least: float) -> Ends:
-        lower, upper = (
-            np.where(np.isfinite(end), np.maximum(share * np.abs(end), least), 0.0) for end in self.lambda_ends
-        )
+        if math.isinf(share):
+            lower, upper = (np.where(np.isfinite(end), np.inf, 0.0) for end in self.lambda_ends)
+        else:
+            lower, upper = (
+                np.where(np.isfinite(end), np.maximum(share * np.abs(end), least), 0.0) for end in self.lambda_ends
+            )
         return self.lambda_ends[0] - lower, self.lambda_ends[1] + upper

@@ -1,8 +1,7 @@
 """How often a policy takes each choice enters, the graph it moves in leaves: what can be reached, most probable ways, circles.
 
 Branches that stay in place are left out and the rest renormalised. The length of a branch is -log of its probability, so
-that the most probable way is the shortest; shortest lengths are relaxed over all branches at once until none changes
-(Bellman 1958, Ford 1956).
+that the most probable way is the shortest (Dijkstra 1959).
 """
 
 from __future__ import annotations
@@ -12,7 +11,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ratherthan.model.compiling import compiled
 from ratherthan.model.mdp import Bools, Floats
+from ratherthan.model.watch import look
+from ratherthan.verify._kernels import nearest
 from ratherthan.verify.frame import Array, Frame, parts, slices
 
 __all__ = ["TIE", "Edge", "Moves", "moves_of"]
@@ -62,9 +64,9 @@ class Moves:
         """Return the largest probability of one move by `choice` to `target`, 0 where there is none."""
         return max((e.chance for e in self.of(state) if (e.choice, e.target) == (choice, target)), default=0.0)
 
-    def reached(self, start: int) -> Bools:
-        """Return which states can be reached, the start included, ``[S]``."""
-        found = np.zeros(len(self.first) - 1, dtype=np.bool_)
+    def reached(self, start: int, known: Bools | None = None) -> Bools:
+        """Return which states can be reached, the start included, ``[S]``; with those `known` to be, and all that they lead to."""
+        found = np.zeros(len(self.first) - 1, dtype=np.bool_) if known is None else known.copy()
         layer = np.array([start], dtype=np.int64)
         while len(layer):
             found[layer] = True
@@ -81,16 +83,14 @@ class Moves:
         """Return the length of the shortest way from each state to one of `to`, ``[S]``; ∞ where there is none."""
         distance = np.where(to, 0.0, np.inf)
         used = np.flatnonzero(~to[self.origin])
-        if not len(used):
-            return distance
-        origin, target, length = self.origin[used], self.target[used], self.length[used]
-        begin = np.flatnonzero(np.append([True], origin[1:] != origin[:-1]))
-        owner = origin[begin]
-        while True:
-            shorter = np.minimum(distance[owner], np.minimum.reduceat(length + distance[target], begin))
-            if (shorter == distance[owner]).all():
-                return distance
-            distance[owner] = shorter
+        if len(used):
+            look()
+            used = used[np.argsort(self.target[used], kind="stable")]
+            count = np.bincount(self.target[used], minlength=len(to))
+            first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+            room = np.zeros((2, len(to)), dtype=np.int64)
+            compiled(nearest, len(used))(first, self.origin[used], self.length[used], distance, room[0], room[1])
+        return distance
 
     def closed(self, start: int) -> tuple[Array, Bools]:
         """Return the component of each state reached, and which lie in one that is never left, ``[S]`` each."""

@@ -43,9 +43,9 @@ class PolicyCheck:
     @cached_property
     def weight(self) -> Floats:
         """How often the policy takes each choice of its state, ``[C]``; 0 throughout a state where nothing is said."""
-        weight = np.zeros(self.frame.mdp.choices)
-        for _, choice, share in self.told.policy.choices:
-            weight[choice] = share
+        weight, rows = np.zeros(self.frame.mdp.choices), self.told.policy.rows
+        known = (rows.choice >= 0) & (rows.choice < len(weight))  # what is not is told by `entries`
+        weight[rows.choice[known]] = rows.share[known]
         return weight
 
     @cached_property
@@ -65,7 +65,7 @@ class PolicyCheck:
         found = np.zeros(self.frame.mdp.states, dtype=np.bool_)
         for state in states:
             if not found[state]:
-                found |= self.moves.reached(state)
+                found = self.moves.reached(state, found)
         return found
 
     def entries(self) -> Check:
@@ -76,22 +76,24 @@ class PolicyCheck:
 
     def _entry(self) -> str | None:
         """Return what is wrong with an entry of the list."""
-        mdp, entries = self.frame.mdp, self.told.policy.choices
-        total: Floats = np.zeros(mdp.states)
-        for state, choice, share in entries:
+        mdp, rows = self.frame.mdp, self.told.policy.rows
+        first, last = mdp.state_to_choices[rows.state], mdp.state_to_choices[rows.state + 1]
+        foreign = (rows.choice < first) | (rows.choice >= last)
+        beyond = ~((rows.share > 0.0) & (rows.share <= 1.0))
+        shared = (rows.share != 1.0) & (not self.told.policy.given)
+        odd = np.flatnonzero(foreign | beyond | shared)
+        if len(odd):
+            state, choice, share = rows[int(odd[0])]
             own = mdp.choices_of(state)
             if choice not in own:
                 return f"state {state} has the choices {own.start} to {own.stop - 1}, got {choice}"
             if not 0.0 < share <= 1.0:
                 return f"a share must be above 0 and at most 1, got {share} at state {state}"
-            if share != 1.0 and not self.told.policy.given:
-                return f"the optimum takes one choice in each state, got a share of {share} at state {state}"
-            total[state] += share
-        chosen = [choice for _, choice, _ in entries]
-        if chosen != sorted(set(chosen)):
+            return f"the optimum takes one choice in each state, got a share of {share} at state {state}"
+        if (np.diff(rows.choice) <= 0).any():
             return "choices must be listed once, in the order of the model"
-        said = np.flatnonzero(total)
-        wrong = said[np.abs(total[said] - 1.0) > SHARES]
+        total = np.bincount(rows.state, weights=rows.share, minlength=mdp.states)
+        wrong = np.flatnonzero((total != 0.0) & (np.abs(total - 1.0) > SHARES))
         return f"the shares of state {wrong[0]} must sum to 1, got {total[wrong[0]]:.10g}" if len(wrong) else None
 
     def _extent(self) -> str | None:
@@ -113,9 +115,11 @@ class PolicyCheck:
         return f"state {silent[0]} is reached, but the policy says nothing of it" if len(silent) else None
 
     def _roots(self) -> list[int]:
-        """Return the states from which the policy must be listed: all that are mentioned, and what alternatives lead to."""
-        mdp, roots = self.frame.mdp, set(self.told.states)
-        for step in self.told.steps:
+        """Return the states from which the policy must be listed: all that the explanation rests on, and what alternatives lead to."""
+        mdp, told = self.frame.mdp, self.told
+        roots = {told.start, *told.route, *told.circle, *told.in_the_way}
+        for step in told.steps:
+            roots |= {step.state} | {state for claim in step.claims for state, _, _ in claim.evidence.follows}
             for row in (row for trade in step.trades for row in (trade.judged[0].taken, trade.judged[0].other)):
                 roots |= set(map(int, mdp.branch_to_target[mdp.branches_of(row.choice)]))
         return sorted(roots)

@@ -8,7 +8,8 @@ Refused at once (ExplanationError), whatever the model: a document that has not 
 an unknown ``outcome``; names of actions in ``against`` that are not those of the evidence; a ``property`` that does not fit
 the model, or ``objective`` and ``levels`` that say something else; further objectives (``also``) likewise; ``states`` that are
 not the model's, or are called otherwise or lie elsewhere; ``choice``, ``choice_index``, ``action``, ``state_name`` and ``foil``
-of a step that do not belong together; ``unfolded`` numbers that are not those of the product.
+of a step that do not belong together; ``unfolded`` numbers that are not those of the product; a ``world`` that is not the
+model's map, and ``alternatives`` that are no other actions of their state or lead elsewhere (`shown`).
 
 Compared with the model, each with a verdict:
 
@@ -22,6 +23,7 @@ Compared with the model, each with a verdict:
 ``route``, ``route_outcome``    a path of the policy from the start, with its outcome; the most probable one, of several
                                 the first listed
 ``circle`` …, ``in_the_way``    where the policy goes round for ever; what can be reached at all; hazards on a shortest way
+``openings``                    closed cells of a map: with them open there is a way, and no fewer would do
 ``route_probability``           the product along the route
 ``arrival_probability``         with its bounds: the chance that the policy arrives
 ``totals``                      what the whole plan comes to under each objective
@@ -66,6 +68,7 @@ from ratherthan.verify.missions import TooLargeError
 from ratherthan.verify.policy import PolicyCheck
 from ratherthan.verify.product import misnamed, unfolded_for
 from ratherthan.verify.route import RouteCheck
+from ratherthan.verify.shown import refuse_foreign_pictures
 from ratherthan.verify.steps import StepCheck
 from ratherthan.verify.trades import TradeCheck, View, views_of
 from ratherthan.verify.values import Band, arriving
@@ -118,6 +121,7 @@ def verify(document: Mapping[str, Any] | str | Path, problem: Problem, *, budget
     refuse_foreign(told, problem)
     refuse_retold(told, text)
     frames = levels_on(problem, wanted)
+    refuse_foreign_pictures(told, problem, frames[0])
     recheck = _Recheck(told=told, problem=problem, frames=frames, further=further, budget=budget or Budget())
     return Verdicts(checks=tuple(recheck.checks()))
 
@@ -159,7 +163,12 @@ class _Recheck:
             found.append(self.policy.attains(self.levels))
         if told.question.scope == "route":
             found += RouteCheck(
-                frame=self.frame, moves=self.policy.moves, explanation=told, arrival=self.arrival, slack=self.slack
+                problem=self.problem,
+                frame=self.frame,
+                moves=self.policy.moves,
+                explanation=told,
+                arrival=self.arrival,
+                slack=self.slack,
             ).checks()
         else:
             found.append(self._check("route_outcome", self._no_route()))
@@ -232,7 +241,7 @@ class _Recheck:
             expected = "there" if frame.goal[told.start] and not frame.aimless else "ended"
         if told.route_outcome != expected:
             return f"it is '{expected}', got '{told.route_outcome}'"
-        if told.circle or told.circle_size or told.in_the_way or not told.circle_certain:
+        if told.circle or told.circle_size or told.in_the_way or told.openings or not told.circle_certain:
             return "nothing can be said of a route that was not asked for"
         states = [told.start] if told.question.scope == "state" and expected == "none" else []
         if [step.state for step in told.steps] != states:

@@ -9,8 +9,10 @@ import numpy as np
 
 from ratherthan.explain.explanation import Explanation
 from ratherthan.model.mdp import Bools
+from ratherthan.model.problem import Problem
 from ratherthan.verify.frame import Frame
 from ratherthan.verify.measure import GROSS, ROUNDED
+from ratherthan.verify.openings import wrong_openings
 from ratherthan.verify.paths import TIE, Moves
 from ratherthan.verify.values import Band
 from ratherthan.verify.verdict import Check, Verdict
@@ -31,6 +33,7 @@ class RouteCheck:
 
     Parameters
     ----------
+    problem : Problem
     frame : Frame
     moves : Moves
         Of the policy.
@@ -41,6 +44,7 @@ class RouteCheck:
         By which share the bounds of a certified number may be wider than what is known here.
     """
 
+    problem: Problem
     frame: Frame
     moves: Moves
     explanation: Explanation
@@ -96,6 +100,8 @@ class RouteCheck:
             return "it goes round nowhere, but a circle is called uncertain"
         if told.route_outcome != "no way" and told.in_the_way:
             return "nothing is in the way, but hazards are given"
+        if told.route_outcome != "no way" and told.openings:
+            return "nothing is in the way, but cells are given that would have to open"
         return None
 
     def _outcome(self) -> str:
@@ -192,7 +198,7 @@ class RouteCheck:
             seen.add(target)
         last = told.route[-1]
         alone = len(self.frame.mdp.choices_of(last)) == 1
-        unsaid = all(state != last for state, _, _ in told.policy.choices)
+        unsaid = not (told.policy.rows.state == last).any()
         silent = not self.moves.of(last) and (alone or unsaid or not self.frame.running[last])
         complete = last in told.route[begin:-1] or silent or len(told.steps) - begin >= MOST_STEPS
         return None if complete else f"it must go on from state {last} until a state repeats"
@@ -229,7 +235,7 @@ class RouteCheck:
         states = np.flatnonzero(reached)
         if list(told.circle) != states[:MOST_NAMED].tolist() or told.circle_size != len(states):
             return f"what can be reached is {states[:MOST_NAMED].tolist()}, {len(states)} in all"
-        return _hazards_in_the_way(frame, told.start, told.in_the_way)
+        return _hazards_in_the_way(frame, told.start, told.in_the_way) or wrong_openings(told, self.problem, frame)
 
     def _arrival(self) -> Check:
         told = self.explanation

@@ -26,9 +26,10 @@ cost no precision. x is kept in two parts, a large and a small one, so that the 
 
 How candidates are found
 ------------------------
-End components in which moving is free are collapsed into one node. Value iteration is tried first; where it is slow, policy
-iteration with linear solves (dense for small systems, else sparse LU). Then the equations are solved once more with a cost
-that is shifted a little in favour of the check, choice by choice, by a multiple of the rounding error.
+End components in which moving is free are collapsed into one node. Large systems are swept through windows (`settling`); the rest,
+and what sweeps do not bring to an end, is solved by policy iteration with linear solves (dense for small systems, else sparse LU).
+Then the equations are solved once more with a cost that is shifted a little in favour of the check, choice by choice, by a
+multiple of the rounding error.
 
 References
 ----------
@@ -91,12 +92,10 @@ def _searched(core: Core, budget: Budget, ends: tuple[Floats, Floats]) -> Array 
 
     def judge(values: Pair, rows: Array | None) -> tuple[bool, bool]:
         x, rest = core.spread_pair(values)
-        drift, error = every.drift(x, rest)
-        x, proved = x + rest, False
-        taken = None if rows is None else core.policy(rows)
-        if taken is not None:
-            drift, error = drift[taken], error[taken]
+        taken, proved = None if rows is None else core.policy(rows), False
         if rows is None or taken is not None:
+            drift, error = (every if taken is None else every.some(taken)).drift(x, rest)
+            x = x + rest
             below = problem.frame.maximise == (rows is not None)  # on which side it may be a bound
             proved = _is_bound(x[problem.open], drift, error, below=below, signed=problem.frame.signed)
         if proved and below:

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from ratherthan.apps.clustered import cluster_options, explain_in_blocks
 from ratherthan.apps.options import Command, Wanted, measure_options, option, output_options, source_options
 
 EXAMPLES = (
@@ -20,6 +21,7 @@ FORMS = ("text", "json")
 
 @click.command("explain", cls=Command, examples=EXAMPLES, short_help="Say what the plan does, and why.")
 @source_options("properties", "discount", "constants", "start", "lexicon")
+@cluster_options(explain_in_blocks)
 @option(
     "--kind",
     section="Question",

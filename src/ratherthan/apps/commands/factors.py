@@ -25,10 +25,24 @@ FORMS = ("table", "json", "csv", "parquet")
     section="Question",
     type=click.Choice(("route", "all")),
     default="route",
-    help="Where the decisions left open are counted: on the route and at --state, or everywhere (slow on large models).",
+    help="Where the decisions left open are counted: on the route and at --state, or everywhere.",
 )
 @option(
     "--state", "states", section="Question", metavar="STATE", multiple=True, help="Count there too; can be repeated."
+)
+@option(
+    "--work",
+    section="Limits",
+    type=click.IntRange(min=0),
+    metavar="N",
+    default=3000,
+    help="Count with at most N million visits of a state; what is not counted by then is left out of the table, and said.",
+)
+@option(
+    "--estimate",
+    section="Limits",
+    is_flag=True,
+    help="Add columns with guesses at what was not counted, and their standard error, where it is known.",
 )
 @measure_options
 @output_options(*FORMS)

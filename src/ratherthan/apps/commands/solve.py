@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from ratherthan.apps.clustered import cluster_options, solve_in_blocks
 from ratherthan.apps.options import Command, Wanted, option, output_options, source_options
 
 EXAMPLES = (
@@ -18,6 +19,7 @@ FORMS = ("text", "json")
 
 @click.command("solve", cls=Command, examples=EXAMPLES, short_help="Print the best value, with bounds that are proved.")
 @source_options("properties", "discount", "constants", "start")
+@cluster_options(solve_in_blocks, files=True)
 @option(
     "--policy",
     section="Policy",
@@ -35,8 +37,12 @@ def command(wanted: Wanted, form: str | None, output: str | None, **given: Any) 
     from ratherthan.apps.asked import answer_of
     from ratherthan.apps.output import as_json, form_of, send, send_lines
 
-    document, text = answer_of(wanted, **given)
-    if form_of(form, output, FORMS) == "json":
-        send([as_json(document)], output)
-    else:
-        send_lines(value_lines(document, text), output)
+    def told(document: dict[str, Any], text: str) -> None:
+        if form_of(form, output, FORMS) == "json":
+            send([as_json(document)], output)
+        else:
+            send_lines(value_lines(document, text), output)
+
+    document, text = answer_of(wanted, told, **given)
+    told(document, text)
+    click.get_current_context().exit(1 if "limit" in document else 0)

@@ -21,14 +21,21 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ratherthan.model._kernels import compiled, dominator_order, reversed_rows
+from ratherthan.model._kernels import compiled, is_compiled, reversed_rows
+from ratherthan.model.dominators._kernels import depth_first, semidominators, tree_places
 from ratherthan.model.index import Index
 from ratherthan.model.mdp import Bools
+from ratherthan.model.watch import look
 
 __all__ = ["DominatorTree", "Graph", "dominator_tree", "graph_of", "opposite"]
 
 Numbers = npt.NDArray[np.int32]
 Offsets = npt.NDArray[np.int64]
+
+SLICE = 1 << 21
+"""How many edges are looked at between two looks at the limits, compiled: less than half a second, mostly."""
+PLAIN = 40
+"""How many times slower the plain loops are."""
 
 
 class Graph(NamedTuple):
@@ -83,6 +90,20 @@ def dominator_tree(graph: Graph, root: int) -> DominatorTree:
     graph : Graph
     root : int
     """
-    kernel = compiled(dominator_order, len(graph.leaving))
-    position, size, order = kernel(graph.leaving_from, graph.leaving, graph.entering_from, graph.entering, root)
-    return DominatorTree(root, position, size, order)
+    work, states = len(graph.leaving), len(graph.leaving_from) - 1
+    budget = SLICE if is_compiled(work) else SLICE // PLAIN
+    number, vertex, parent, path = np.full(states, -1, dtype=np.int32), *np.zeros((3, states), dtype=np.int32)
+    number[root], vertex[0], path[0] = 0, root, root
+    room = number, vertex, parent, path, graph.leaving_from[:-1].copy()
+    at = np.array([1, 0])
+    search, dominate = compiled(depth_first, work), compiled(semidominators, work)
+    while not search(graph.leaving_from, graph.leaving, room, at, budget):
+        look()
+    found = int(at[0])
+    semi = np.arange(found, dtype=np.int32)
+    links = semi, np.stack([parent[:found], semi], axis=1), path
+    last = found - 1
+    while last > 0:
+        last = dominate(graph.entering_from, graph.entering, (number, vertex, parent), links, last, budget)
+        look()
+    return DominatorTree(root, *compiled(tree_places, work)(states, vertex, parent, semi))
