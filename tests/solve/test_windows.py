@@ -332,6 +332,8 @@ def test_what_was_swept_is_told_where_a_limit_ends_it() -> None:
 @pytest.mark.parametrize("states", [3200, 5000])
 def test_a_window_that_holds_everything_is_given_more_than_one_look(states: int) -> None:
     """A guess of what is left takes two looks: small models make many sweeps between these."""
+    if not ROOM.is_compiled(10**9):
+        pytest.skip("windows are swept by compiled code only")
     solution = solve(expander(states))
     assert solution.engine == "windowed sweeps"
     assert solution.outcome.name == "CERTIFIED"
