@@ -125,12 +125,12 @@ def by_mdpsolver(problem: Maker, tolerance: float = PRECISION) -> Callable[[], o
             "tranMatProbs": [[chance[row].tolist() for row in own] for own in rows],
             "tranMatColumns": [[target[row].tolist() for row in own] for own in rows],
         }
-        program = mdpsolver.model()
-        program.mdp(**words)
 
         def run() -> Seen:
+            program = mdpsolver.model()  # anew each time: it keeps what it found
+            program.mdp(**words)
             program.solve(algorithm="mpi", tolerance=tolerance)
-            return Seen(note="no proof")
+            return Seen(note="no proof; the model is handed over each time")
 
         return run
 
