@@ -309,9 +309,6 @@ class Extras:
             self.fail(f"a string at '{key}'", value)
         return value
 
-    def _maybe_text(self, value: Any, key: str) -> str | None:
-        return None if value is None else self._text(value, key)
-
     def _whole(self, value: Any, key: str) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**31:
             self.fail(f"a whole number at '{key}'", value)

@@ -72,7 +72,8 @@ def optimum(task: Task, method: Method | None, progress: Progress | None = None,
     ----------
     task : Task
     method : PolicyIteration or Sweeps, optional
-        Without it the program chooses: windowed sweeps where they suit, else policy iteration.
+        Without it the program chooses, in this order, each giving up where it does not suit: windowed sweeps, one backward
+        pass, elimination past traps, sweeps of any sum, policy iteration, value iteration.
     progress : callable, optional
     finest : int
         Which of the tolerances for ties to begin with; the later, the finer.
