@@ -18,7 +18,8 @@ from ratherthan.cluster.spreading import Known, block_of, levels_of, usable_of
 from ratherthan.model._kernels import compiled
 from ratherthan.model.mdp import Bools, Floats
 from ratherthan.model.watch import look
-from ratherthan.solve._kernels import Ordered, ordered_rows, window_pass, window_residual
+from ratherthan.solve._kernels import Ordered, ordered_rows, window_sweeps
+from ratherthan.solve.contracting._kernels import gaps_of
 from ratherthan.solve.system import System, build_system, drift
 
 __all__ = ["Checked", "RowsAt", "check", "measure", "policy_rows", "rows_at", "sweep", "values_of"]
@@ -75,8 +76,8 @@ def _equations(block: Block, known: Known) -> Equations:
         (system.node_to_rows[: n + 1], system.row_to_branches, system.target),
         system.probability,
         system.cost,
-        order,
-        rank,
+        (order, rank),
+        (np.zeros(n + 1, dtype=np.int32), np.zeros(len(system.row_to_branches), dtype=np.int32)),
     )
     made = Equations(system=system, rows=rows, order=order, layers=layers, node=node, open=running)
     block.memory = {"equations": (key, made)}
@@ -121,9 +122,13 @@ def sweep(extent: Extent, known: Known) -> tuple[Floats, float]:
     most = 10 * MOST_VISITS if anew else MOST_VISITS
     work, left, width, residual = len(made.rows.target), most * max(n, 1), WIDTH, np.inf
     for _ in range(MOST_PASSES if n else 0):
-        left -= compiled(window_pass, work)(made.rows, made.layers, values, taken, width, known.tolerance, 0.0, left)
+        at, spans = np.zeros(2, dtype=np.int64), (width, max(width // 2, 1))
+        left -= compiled(window_sweeps, work)(
+            made.rows, made.layers, values, taken, at, spans, (known.tolerance, 0.0), left
+        )[0]
         look()
-        before, residual = residual, float(compiled(window_residual, work)(made.rows, values))
+        best, gaps = np.zeros(n, dtype=np.int64), np.zeros(n)
+        before, residual = residual, float(compiled(gaps_of, work)(made.rows, values, best, gaps))
         if residual <= known.tolerance or left < 0 or not np.isfinite(residual):
             break
         if residual > 0.1 * before:

@@ -33,12 +33,11 @@ __all__ = [
     "substitute",
     "sweep",
     "swept_rows",
-    "window_pass",
-    "window_residual",
     "window_sweeps",
 ]
 
 Ints64 = npt.NDArray[np.int64]
+Offsets = npt.NDArray[np.int32] | npt.NDArray[np.int64]
 
 
 class Rows(NamedTuple):
@@ -206,24 +205,29 @@ def sweep(lower: Rows, right: Floats) -> Floats:
 class Ordered(NamedTuple):
     """A system's rows with the nodes in another order, loops to the own node taken out, what is left scaled to sum to 1."""
 
-    node_to_rows: npt.NDArray[np.int32]  # [n+1]
-    row_to_branches: npt.NDArray[np.int32]  # [m+1]
+    node_to_rows: Offsets  # [n+1]
+    row_to_branches: Offsets  # [m+1]
     target: npt.NDArray[np.int32]
     probability: Floats
     cost: Floats  # [m]
 
 
 def ordered_rows(
-    rows: tuple[Ints64, Ints64, Ints64], probability: Floats, cost: Floats, order: Ints64, rank: Ints64
+    rows: tuple[Ints64, Ints64, Ints64],
+    probability: Floats,
+    cost: Floats,
+    places: tuple[Ints64, Ints64],
+    offsets: tuple[Offsets, Offsets],
 ) -> Ordered:
-    """Return the rows of a system in the `order` of its nodes; `rank` is the place of each node (and sink) in it.
+    """Return the rows of a system in another order of its nodes, loops to the own node taken out, the rest scaled to sum to 1.
 
-    `rows` are node_to_rows, row_to_branches and target.
+    `rows` are node_to_rows, row_to_branches and target, `places` the node at each place and the place of each node (and sink);
+    `offsets` are filled in and tell by their type how wide the numbers are: zeros, ``[n+1]`` and ``[m+1]``.
     """
     node_to_rows, row_to_branches, target = rows
+    order, rank = places
+    rows_of_node, branches_of_row = offsets
     n, m = len(node_to_rows) - 1, len(row_to_branches) - 1
-    rows_of_node = np.zeros(n + 1, np.int32)
-    branches_of_row = np.zeros(m + 1, np.int32)
     after = np.zeros(len(target), np.int32)
     chance = np.zeros(len(target), np.float64)
     paid = np.zeros(m, np.float64)
@@ -245,80 +249,6 @@ def ordered_rows(
             branches_of_row[row] = branch
         rows_of_node[i + 1] = row
     return Ordered(rows_of_node, branches_of_row, after[:branch], chance[:branch], paid)
-
-
-def window_pass(
-    rows: Ordered,
-    layers: Ints64,
-    values: Floats,
-    taken: npt.NDArray[np.int32],
-    width: int,
-    tolerance: float,
-    step: float,
-    budget: int,
-) -> int:
-    """Solve window after window of `width` layers, each until no sweep changes a value by more than `tolerance`.
-
-    A sweep that chooses is followed by up to three that keep to what was chosen. `values` (those of the sinks behind them) and
-    the row `taken` at each node leave improved. A positive `step` says that there are no values yet: a node then begins with
-    the least value of the nodes before it that its first row leads to, and a step more. Returns how many nodes were visited, a
-    number above `budget` if it was spent.
-    """
-    nodes, last = len(rows.node_to_rows) - 1, len(layers) - 1
-    begun, spent = 0, 0
-    for layer in range(0, last, max(width // 2, 1)):
-        begin, end = layers[layer], layers[min(layer + width, last)]
-        if step > 0.0:
-            ahead = layers[min(layer + width + width // 2, last)]  # what the window looks at must have values, too
-            for s in range(begun, ahead):
-                least = np.inf
-                first = rows.node_to_rows[s]
-                for b in range(rows.row_to_branches[first], rows.row_to_branches[first + 1]):
-                    t = rows.target[b]
-                    if (t < s or t >= nodes) and values[t] < least:
-                        least = values[t]
-                values[s] = step + (least if least < np.inf else values[max(s - 1, 0)])
-            begun = max(begun, ahead)
-        keeping = 0  # how many sweeps more keep to what was chosen
-        while spent <= budget:
-            change = 0.0
-            for s in range(begin, end):
-                low, high = rows.node_to_rows[s], rows.node_to_rows[s + 1]
-                if keeping > 0:
-                    low = taken[s]
-                    high = low + 1
-                best = np.inf
-                for a in range(low, high):
-                    x = rows.cost[a]
-                    for b in range(rows.row_to_branches[a], rows.row_to_branches[a + 1]):
-                        x += rows.probability[b] * values[rows.target[b]]
-                    if x < best:
-                        best = x
-                        taken[s] = a
-                change = max(change, abs(best - values[s]))
-                values[s] = best
-            spent += end - begin
-            if keeping == 0:
-                if not change > tolerance:
-                    break
-                keeping = 3
-            else:
-                keeping = keeping - 1 if change > 0.5 * tolerance else 0
-    return spent
-
-
-def window_residual(rows: Ordered, values: Floats) -> float:
-    """Return max |Tv - v|."""
-    largest = 0.0
-    for s in range(len(rows.node_to_rows) - 1):
-        best = np.inf
-        for a in range(rows.node_to_rows[s], rows.node_to_rows[s + 1]):
-            x = rows.cost[a]
-            for b in range(rows.row_to_branches[a], rows.row_to_branches[a + 1]):
-                x += rows.probability[b] * values[rows.target[b]]
-            best = min(best, x)
-        largest = max(largest, abs(best - values[s]))
-    return largest
 
 
 class Swept(NamedTuple):

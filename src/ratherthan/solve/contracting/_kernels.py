@@ -12,21 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ratherthan.model.mdp import Floats
+from ratherthan.solve._kernels import Ordered
 
-__all__ = ["Rows", "Turn", "first_values", "gaps_of", "in_order", "relax_all", "relax_windows"]
+__all__ = ["Turn", "first_values", "gaps_of", "relax_all", "relax_windows"]
 
 Ints64 = npt.NDArray[np.int64]
-Ints32 = npt.NDArray[np.int32]
-
-
-class Rows(NamedTuple):
-    """Rows with the nodes in another order, loops to the own node taken out, what is left scaled to sum to 1."""
-
-    node_to_rows: Ints64  # [n+1]
-    row_to_branches: Ints64  # [m+1]
-    target: Ints32
-    probability: Floats
-    cost: Floats  # [m]
 
 
 class Turn(NamedTuple):
@@ -37,38 +27,7 @@ class Turn(NamedTuple):
     spent: int
 
 
-def in_order(
-    rows: tuple[Ints64, Ints64, Ints64], probability: Floats, cost: Floats, order: Ints64, rank: Ints64
-) -> Rows:
-    """Return rows (node_to_rows, row_to_branches, target) in the `order` of their nodes; `rank` is the place of each in it."""
-    node_to_rows, row_to_branches, target = rows
-    n, m = len(node_to_rows) - 1, len(row_to_branches) - 1
-    rows_of_node = np.zeros(n + 1, np.int64)
-    branches_of_row = np.zeros(m + 1, np.int64)
-    after = np.zeros(len(target), np.int32)
-    chance = np.zeros(len(target), np.float64)
-    paid = np.zeros(m, np.float64)
-    row, branch = 0, 0
-    for i in range(n):
-        node = order[i]
-        for a in range(node_to_rows[node], node_to_rows[node + 1]):
-            leave = 0.0
-            for b in range(row_to_branches[a], row_to_branches[a + 1]):
-                if target[b] != node:
-                    leave += probability[b]
-            for b in range(row_to_branches[a], row_to_branches[a + 1]):
-                if target[b] != node:
-                    after[branch] = rank[target[b]]
-                    chance[branch] = probability[b] / leave
-                    branch += 1
-            paid[row] = cost[a] / leave
-            row += 1
-            branches_of_row[row] = branch
-        rows_of_node[i + 1] = row
-    return Rows(rows_of_node, branches_of_row, after[:branch].copy(), chance[:branch].copy(), paid)
-
-
-def first_values(rows: Rows, values: Floats, taken: Ints64) -> None:
+def first_values(rows: Ordered, values: Floats, taken: Ints64) -> None:
     """Guess values in the order of the nodes: of the rows that lead back, the best one, as if it led nowhere else."""
     n = len(rows.node_to_rows) - 1
     for s in range(n):
@@ -90,7 +49,7 @@ def first_values(rows: Rows, values: Floats, taken: Ints64) -> None:
 
 
 def relax_windows(
-    rows: Rows, layers: Ints64, values: Floats, taken: Ints64, tolerance: Floats, place: tuple[int, int, int, int]
+    rows: Ordered, layers: Ints64, values: Floats, taken: Ints64, tolerance: Floats, place: tuple[int, int, int, int]
 ) -> Turn:
     """Sweep window after window of `width` layers, each until no value changes by more than its tolerance.
 
@@ -136,7 +95,7 @@ def relax_windows(
     return Turn(layer, keeping, spent)
 
 
-def relax_all(rows: Rows, values: Floats, taken: Ints64) -> None:
+def relax_all(rows: Ordered, values: Floats, taken: Ints64) -> None:
     """Sweep all nodes in their order, choosing, and nine times back and forth, keeping to what was chosen."""
     n = len(rows.node_to_rows) - 1
     for sweep in range(10):
@@ -157,7 +116,7 @@ def relax_all(rows: Rows, values: Floats, taken: Ints64) -> None:
             values[s] = best
 
 
-def gaps_of(rows: Rows, values: Floats, taken: Ints64, gaps: Floats) -> float:
+def gaps_of(rows: Ordered, values: Floats, taken: Ints64, gaps: Floats) -> float:
     """Fill in Tv - v at every node, and which row has it; return the largest |Tv - v|."""
     largest = 0.0
     for s in range(len(rows.node_to_rows) - 1):

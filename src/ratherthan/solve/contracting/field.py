@@ -29,7 +29,8 @@ from ratherthan.model import graph
 from ratherthan.model._kernels import LEAST_WORK, compiled
 from ratherthan.model.mdp import Floats
 from ratherthan.model.watch import look
-from ratherthan.solve.contracting._kernels import Rows, first_values, gaps_of, in_order, relax_all, relax_windows
+from ratherthan.solve._kernels import Ordered, ordered_rows
+from ratherthan.solve.contracting._kernels import first_values, gaps_of, relax_all, relax_windows
 from ratherthan.solve.system import System, rows_of
 
 __all__ = ["Field", "begin_with", "field_of", "residual_of", "swept", "swept_whole"]
@@ -58,7 +59,7 @@ class Field:
     system : System
     sign : float
         -1 where the most is wanted.
-    rows : Rows
+    rows : Ordered
     order : array of int, ``[n]``
         The node at each place.
     layers : array of int
@@ -71,7 +72,7 @@ class Field:
 
     system: System
     sign: float
-    rows: Rows
+    rows: Ordered
     order: Nodes
     layers: Nodes
     values: Floats
@@ -127,8 +128,9 @@ def field_of(system: System, maximise: bool, *, discounted: bool = False, cost: 
         np.asarray(part, dtype=np.int64) for part in (system.node_to_rows, system.row_to_branches, system.target)
     )
     work = max(len(target), LEAST_WORK)
-    kernel = compiled(in_order, work)
-    rows = kernel((begin, branches, target), system.probability, sign * paid, order, rank)
+    offsets = np.zeros(len(begin), dtype=np.int64), np.zeros(len(branches), dtype=np.int64)
+    kernel = compiled(ordered_rows, work)
+    rows = kernel((begin, branches, target), system.probability, sign * paid, (order, rank), offsets)
     values, taken = np.zeros(n + 2), np.zeros(n, dtype=np.int64)
     values[n + 1] = sign
     compiled(first_values, work)(rows, values, taken)

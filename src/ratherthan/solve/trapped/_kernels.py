@@ -17,6 +17,7 @@ __all__ = ["Pool", "exact_rows", "same_components", "substitute_nodes", "sweep_r
 
 Ints64 = npt.NDArray[np.int64]
 Numbers = npt.NDArray[np.int32]
+Offsets = npt.NDArray[np.int32] | npt.NDArray[np.int64]
 
 
 def exact_rows(
@@ -90,8 +91,8 @@ def exact_rows(
 
 
 def sweep_rows(
-    node_to_rows: Numbers,
-    row_to_branches: Numbers,
+    node_to_rows: Offsets,
+    row_to_branches: Offsets,
     target: Numbers,
     probability: Floats,
     values: Floats,

@@ -168,17 +168,18 @@ class _Sweeps:
         rank[self.order] = np.arange(n)
         rows = (system.node_to_rows, system.row_to_branches, system.target)
         kernel = compiled(ordered_rows, len(system.target))
-        self.ordered: Ordered = kernel(rows, system.probability, system.cost, self.order, rank)
+        offsets = np.zeros(n + 1, dtype=np.int32), np.zeros(system.rows + 1, dtype=np.int32)
+        self.ordered: Ordered = kernel(rows, system.probability, system.cost, (self.order, rank), offsets)
         self.values = np.zeros(n + 2)
         self.values[n + 1] = 1.0
-        self.taken = self.ordered.node_to_rows[:-1].copy()
+        self.taken = self.ordered.node_to_rows[:-1].astype(np.int32)
 
     def start(self, values: Floats, rows: Nodes | None = None) -> None:
         """Take values of the nodes to sweep from, ``[n]``, and rows, if they are other than the last ones."""
         self.values[: len(self.order)] = values[self.order]
         if rows is not None:
             place = (rows - self.system.node_to_rows[:-1])[self.order]
-            self.taken = self.ordered.node_to_rows[:-1] + place.astype(self.taken.dtype)
+            self.taken = (self.ordered.node_to_rows[:-1] + place).astype(np.int32)
 
     def run(self, sweeps: int, gain: float) -> int:
         """Sweep; return at how many nodes the row changed."""
@@ -188,7 +189,11 @@ class _Sweeps:
         made = 0
         while made < sweeps:
             look()
-            _, moving, _ = kernel(*self.ordered[:4], self.values, self.taken, self.sign, gain, at_once)
+            rows = self.ordered
+            offsets = rows.node_to_rows, rows.row_to_branches
+            _, moving, _ = kernel(
+                *offsets, rows.target, rows.probability, self.values, self.taken, self.sign, gain, at_once
+            )
             made += at_once
             if moving == 0:
                 break
