@@ -37,7 +37,7 @@ def by_us(problem: Maker, method: PolicyIteration | Sweeps | None = None) -> Cal
             solution = solve(made, method=method)
             lower, upper = solution.lower[0], solution.upper[0]
             finite = np.isfinite(upper) & (upper != lower)
-            width = float(np.max((upper - lower)[finite] / np.abs(upper[finite]), initial=0.0))
+            width = float(np.max((upper[finite] - lower[finite]) / np.abs(upper[finite]), initial=0.0))
             proved = "" if solution.outcome is Outcome.CERTIFIED else solution.outcome.value
             return Seen(width=width, note=proved or solution.engine)
 

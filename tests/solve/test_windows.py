@@ -113,6 +113,33 @@ def line(states: int, forward: float) -> Problem:
     return problem_of(table, OBJECTIVES["least cost"], goals=[states])
 
 
+def test_rows_that_are_nearly_as_good_as_the_best_do_not_end_the_sweeps() -> None:
+    """What is listed first and lies behind the best by less than what ties may lose is taken, and the bounds allow for it."""
+    plain = line(300, 0.9)
+    offsets = plain.mdp.choice_to_branches
+    twice = np.repeat(np.arange(301), 2)
+    cost = np.where(twice < 300, 1.0 + np.tile([1.6e-7, 0.0], 301), 0.0)
+    mdp = replace(
+        plain.mdp,
+        state_to_choices=2 * plain.mdp.state_to_choices,
+        choice_to_branches=np.concatenate([[0], np.cumsum(np.diff(offsets)[twice])]),
+        branch_to_target=np.concatenate([plain.mdp.branch_to_target[offsets[s] : offsets[s + 1]] for s in twice]),
+        branch_to_probability=np.concatenate(
+            [plain.mdp.branch_to_probability[offsets[s] : offsets[s + 1]] for s in twice]
+        ),
+        choice_to_action=np.tile([0, 1], 301),
+        actions=("scenic", "go"),
+        rewards={name: Reward(choice=cost) for name in plain.mdp.rewards},
+    )
+    found = windowed_optimum(task_on(replace(plain, mdp=mdp)))
+    best = solve(plain).values[0][:300]
+    assert found is not None
+    assert (found.choice[:300] == 2 * np.arange(300)).all()  # the first listed
+    assert (found.lower[:300] <= best).all()
+    assert (found.upper[:300] >= best * (1 + 1.6e-7)).all()  # what that plan costs
+    assert (found.upper[:300] - found.lower[:300] <= 1e-6 * best).all()
+
+
 def exact_needs(problem: Problem, values: np.ndarray, factor: Fraction) -> list[Fraction]:
     """Return cost + Σ p x - x over fractions for x = factor · values, p divided by their sum, of all rows with finite targets."""
     mdp, found = problem.mdp, []

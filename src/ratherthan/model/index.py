@@ -35,19 +35,22 @@ class Index:
     ----------
     state_to_choices, choice_to_branches, branch_to_target : array of int, ``[S+1]``, ``[C+1]``, ``[B]``
         As in `MDP`.
-    choice_to_state : array of int, ``[C]``
-        The state of each choice.
     """
 
     state_to_choices: Ints  # [S+1]
     choice_to_branches: Ints  # [C+1]
     branch_to_target: Ints  # [B]
-    choice_to_state: Ints  # [C]
+
+    @cached_property
+    def choice_to_state(self) -> Ints:
+        """The state of each choice, ``[C]``."""
+        width = self.branch_to_target.dtype.type
+        return _locked(np.repeat(np.arange(self.states, dtype=width), np.diff(self.state_to_choices)), width)
 
     @cached_property
     def branch_to_choice(self) -> Ints:
         """The choice of each branch, ``[B]``."""
-        width = self.choice_to_state.dtype.type
+        width = self.branch_to_target.dtype.type
         return _locked(np.repeat(np.arange(self.choices, dtype=width), np.diff(self.choice_to_branches)), width)
 
     @property
@@ -62,7 +65,7 @@ class Index:
 
     @cached_property
     def _reverse(self) -> tuple[Ints, Ints]:
-        width = self.choice_to_state.dtype.type
+        width = self.branch_to_target.dtype.type
         if self.work > MANY and is_compiled(self.work):
             kernel = compiled(entering_choices, self.work)
             begin, choices = kernel(self.choice_to_branches, self.branch_to_target, self.states)
@@ -73,8 +76,12 @@ class Index:
 
     def forget(self) -> None:
         """Give back the memory of what is made anew where it is asked for again."""
-        for name in ("_reverse", "branch_to_choice"):
+        for name in ("_reverse", "branch_to_choice", "choice_to_state"):
             self.__dict__.pop(name, None)
+
+    def by_choice(self, states: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+        """Return for each choice whether its state is one of `states` ``[S]``, as ``[C]``."""
+        return np.repeat(states, np.diff(self.state_to_choices))
 
     @property
     def states(self) -> int:
@@ -121,12 +128,10 @@ def build_index(state_to_choices: Ints, choice_to_branches: Ints, branch_to_targ
     width = _width(states, len(choice_to_branches) - 1, len(branch_to_target))
     room_for(BYTES * len(branch_to_target), f"The index of a model of {len(branch_to_target)} branches")
     look()
-    choice_to_state = np.repeat(np.arange(states, dtype=width), np.diff(state_to_choices))
     return Index(
         state_to_choices=_locked(state_to_choices, width),
         choice_to_branches=_locked(choice_to_branches, width),
         branch_to_target=_locked(branch_to_target, width),
-        choice_to_state=_locked(choice_to_state, width),
     )
 
 

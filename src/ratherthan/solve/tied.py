@@ -65,12 +65,13 @@ def fixed_best(task: Task) -> Bools:
     """
     goal, open_ = task.goal, task.open
     index, running = goal.index, goal.running
-    best = ~running[index.choice_to_state]
-    choices, _ = branches_of(index.state_to_choices, np.flatnonzero(running & ~open_))
+    best = index.by_choice(~running)
+    decided = np.flatnonzero(running & ~open_)
+    choices, begin = branches_of(index.state_to_choices, decided)
     if not len(choices):
         return best
     branches, offsets = branches_of(index.choice_to_branches, choices)
-    value, after = task.fixed[index.choice_to_state[choices]], index.branch_to_target[branches]
+    value, after = np.repeat(task.fixed[decided], np.diff(begin)), index.branch_to_target[branches]
     same = task.fixed[after] == np.repeat(value, np.diff(offsets))
     leads = np.logical_and.reduceat(same & ~open_[after], offsets[:-1])
     infinite = np.logical_or.reduceat(same, offsets[:-1])

@@ -50,9 +50,9 @@ FEWEST = 3000
 SHARE, MOST = 0.05, 5e-8
 """The residual to come to in units of the least cost: a share of the precision that is wanted, and how much it may be at most."""
 USEFUL = 2.0
-"""Up to how many such residuals h is of use."""
+"""Up to how many such residuals h is of use; where sweeps can do no more, what ties may lose comes on top."""
 TIE = 4.0
-"""Up to how many residuals a row may fall behind the best and be tied."""
+"""Up to how many residuals a row may fall behind the best and be tied; the plan that takes such rows may lose as much."""
 ROOM = 1.0 + 1e-6
 TINY = 1e-15
 BYTES = 12, 16
@@ -147,7 +147,11 @@ def _swept(
         if shares is not None and max(shares[:2]) <= USEFUL * settings.residual:
             return shares
         if needs.residual <= settings.residual * swept.least or not widened(state, before):
-            break
+            # no finer sweep makes rows that are nearly tied lose less
+            bearable = (
+                shares is not None and max(shares[0], shares[1] - TIE * settings.residual) <= USEFUL * settings.residual
+            )
+            return shares if bearable else None
     return None
 
 
