@@ -28,6 +28,7 @@ from ratherthan.solve.certify import (
     optimum_bound,
     outward,
 )
+from ratherthan.solve.equations import systems_of
 from ratherthan.solve.linear import solve_chain
 from ratherthan.solve.policy_iteration import Found, PolicyIteration, iterate_policies
 from ratherthan.solve.system import System, rows_of
@@ -51,7 +52,7 @@ def prepared(table: Table, objective: str, **places: Any) -> tuple[System, Syste
     """Return the collapsed system of a problem, the whole one, the node of each open state, and the solver's answer."""
     problem = problem_of(table, OBJECTIVES[objective], **places)
     task = task_of(goal_of(problem, objective_of(problem, None)))
-    node, core, whole = optimum._systems(task)
+    node, core, whole = systems_of(task)
     found = iterate_policies(core, task.goal.maximise, PolicyIteration())
     assert found is not None
     return core, whole, node[task.open], found, problem
@@ -98,7 +99,7 @@ def test_without_rounding_only_the_exact_solution_fits() -> None:
     }
     objective = ExpectedReward(goal='"goal"', reward="cost")
     task = task_of(goal_of(problem_of(table, objective, goals=[2]), objective))
-    _, whole, _ = optimum._systems(task)
+    _, whole, _ = systems_of(task)
     assert fits(whole, np.array([-1.0, -4.0]), -1.0)
     assert not fits(whole, np.array([-1.0, -4.0]), 1.0), "slipping is worse"
     assert not fits(whole, np.nextafter([-1.0, -4.0], -np.inf), -1.0)

@@ -10,6 +10,7 @@ import pytest
 from exact import chain_values
 
 from ratherthan.solve import linear, sparse
+from ratherthan.solve.eliminating import ordering
 from ratherthan.solve.linear import Method, methods_for, solve_chain
 from ratherthan.solve.system import System
 
@@ -95,8 +96,9 @@ def test_a_row_that_cannot_be_left_is_refused() -> None:
 
 
 def test_factors_that_fill_are_noticed_and_krylov_takes_over(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sparse, "MOST_FILL_IN_ALL", 1000)
-    monkeypatch.setattr(sparse, "MOST_FILL", 1)
+    monkeypatch.setattr(ordering, "LEAST_FILL", 1000)
+    monkeypatch.setattr(ordering, "MOST_FILL", 1)
+    monkeypatch.setattr(ordering, "MOST_FIRST_FILL", 1)
     monkeypatch.setattr(linear, "MOST_DENSE", 0)
     random = np.random.default_rng(1)
     targets = random.integers(0, 200, (200, 3)).tolist()

@@ -20,9 +20,9 @@ from ratherthan.solve import evaluate
 from ratherthan.solve.system import System
 
 pytestmark = pytest.mark.kernels
-contraction, rooms, chain = (
-    importlib.import_module(name)
-    for name in ("ratherthan.solve.contracting.contraction", "ratherthan.solve.contracting", "ratherthan.solve.chain")
+ROOM = "ratherthan.solve.contracting"
+contraction, chains, rooms, chain = (
+    importlib.import_module(name) for name in (ROOM + ".contraction", ROOM + ".chains", ROOM, "ratherthan.solve.chain")
 )
 LEVELS: tuple[Level, ...] = (
     ExpectedCost(goal=GOAL, reward="cost"),
@@ -38,7 +38,7 @@ def proved(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     told: list[bool] = []
 
     def watched(system: System, maximise: bool, discount: float) -> Any:
-        found = contraction.chain_bounds_at_size(system, maximise, discount)
+        found = chains.chain_bounds_at_size(system, maximise, discount)
         told.append(found is not None)
         return found
 
@@ -138,14 +138,14 @@ def test_going_round_for_ever_is_worth_nothing_at_any_size(proved: list[bool]) -
 
 
 def test_what_sweeps_say_wrongly_is_not_believed(monkeypatch: pytest.MonkeyPatch, proved: list[bool]) -> None:
-    rightly = contraction._valued
+    rightly = chains.valued
 
     def wrongly(field: Any, *rest: Any) -> Any:
         way = rightly(field, *rest)
         field.values[:-2] *= 0.5
         return way
 
-    monkeypatch.setattr(contraction, "_valued", wrongly)
+    monkeypatch.setattr(chains, "valued", wrongly)
     level = LEVELS[0]
     for seed in range(20):
         random = Random(seed)

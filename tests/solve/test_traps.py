@@ -13,16 +13,17 @@ from exact import optimum_by_enumeration, rows_of
 from random_models import OBJECTIVES, Table, problem_of
 
 from ratherthan.apps.answers import value_document, value_lines
+from ratherthan.model.mdp import MDP
 from ratherthan.model.objective import ReachAvoid
 from ratherthan.model.policy import Policy
 from ratherthan.model.problem import Problem
 from ratherthan.solve import Outcome, Solution, evaluate, solve, trapped
 from ratherthan.solve.certify import never_falls, never_rises
+from ratherthan.solve.eliminating import Factored
 from ratherthan.solve.linear import solve_chain
 from ratherthan.solve.system import System
 from ratherthan.solve.system import rows_of as taken
 from ratherthan.solve.trapped import attained, exact, proof, traps
-from ratherthan.solve.trapped.factored import Factored
 from ratherthan.solve.trapped.horizon import within_steps
 from ratherthan.solve.trapped.plateaus import flattened
 
@@ -207,7 +208,7 @@ def test_without_given_probabilities_nothing_is_told_exactly() -> None:
 def test_what_is_kept_of_factors_is_as_good_as_new(seed: int) -> None:
     random = Random(seed)
     system = random_system(random, 60)
-    equations = Factored(system, np.zeros(60, dtype=np.int64))
+    equations = Factored(system)
     rows = np.array([random.randrange(*system.node_to_rows[s : s + 2]) for s in range(60)])
     for _ in range(6):
         assert equations.follow(rows)
@@ -282,7 +283,7 @@ def steps_exactly(problem: Problem, steps: int) -> list[Fraction]:
 def test_where_no_bound_is_proved_from_above_it_is_said_for_how_many_steps_one_is(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(attained, "bound_of_all", lambda *_: None)
+    monkeypatch.setattr(proof, "bound_of_all", lambda *_: None)
     problem = trapped_problem(Random(seed), "safest", states=5)
     problem = replace(problem, objective=ReachAvoid(goal='"goal"', through='!"hazard"'))
     solution = solve(problem)
@@ -326,3 +327,37 @@ def test_a_given_policy_is_told_as_sharply(seed: int) -> None:
     solution = evaluate(problem, Policy(choice=first))
     assert (solution.policy_lower <= solution.policy_upper).all()
     assert (solution.policy_upper - solution.policy_lower <= 1e-6).all()
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("leak", [1e-9, 1e-30, 1e-100])
+@pytest.mark.parametrize("maximise", [False, True])
+def test_a_long_way_through_rooms_that_hardly_leak_is_proved_from_both_sides(leak: float, maximise: bool) -> None:
+    """Each of 4000 rooms has a door to the next one that is risky; to stay inside seems to be free of it."""
+    count = 4000
+    risks = np.random.default_rng(1).uniform(1e-6, 1e-3, count)
+    trap, goal = 2 * count, 2 * count + 1
+    inner, door = 2 * np.arange(count), 2 * np.arange(count) + 1
+    ahead = np.append(inner[1:], goal)
+    row = np.stack([door, np.full(count, trap), inner, np.full(count, trap), ahead, np.full(count, trap)], 1)
+    chance = np.stack([np.full(count, p) for p in (1.0, leak, 1.0, leak)] + [1.0 - risks, risks], 1)
+    mdp = MDP(
+        state_to_choices=np.append(
+            np.stack([3 * np.arange(count), 3 * np.arange(count) + 1], 1), 3 * count + np.arange(3)
+        ),
+        choice_to_branches=np.append(np.arange(0, 6 * count + 1, 2), [6 * count + 1, 6 * count + 2]),
+        branch_to_target=np.append(row, [trap, goal]),
+        branch_to_probability=np.append(chance, [1.0, 1.0]),
+        choice_to_action=np.zeros(3 * count + 2, dtype=np.int64),
+        actions=("go",),
+        initial=np.array([0]),
+        labels={"trap": np.arange(2 * count + 2) == trap, "goal": np.arange(2 * count + 2) == goal},
+    )
+    wanted = "goal" if maximise else "trap"
+    objective = ReachAvoid(goal=f'"{wanted}"', through=None, maximise=maximise)
+    solution = solve(Problem(mdp=mdp, objective=objective))
+    arrives = float(np.exp(np.log1p(-risks).sum()))
+    assert solution.outcome is Outcome.CERTIFIED
+    value = arrives if maximise else 1.0 - arrives
+    slack = 1e-11 + 3.0 * count * leak
+    assert value - slack <= solution.lower[0, 0] <= solution.upper[0, 0] <= value + slack

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from ratherthan.solve.stopped import keeping
 from ratherthan.solve.system import ROUNDING, System, build_system, drift
 from ratherthan.solve.task import Task, goal_of, task_of
 from ratherthan.solve.windowed import suits_windows, windowed_optimum
-from ratherthan.solve.windows import Sweeping, Windows, begin_sweeps, sweep_on
+from ratherthan.solve.windows import Sweeping, Windows, _visits_left, begin_sweeps, sweep_on
 
 pytestmark = pytest.mark.kernels
 ROOM = sys.modules["ratherthan.solve.windowed"]
@@ -333,12 +334,15 @@ def test_bounds_are_as_narrow_as_the_precision_wants_them() -> None:
     assert widths[2] <= 4e-9
 
 
-def test_what_was_swept_is_told_where_a_limit_ends_it() -> None:
+@pytest.mark.parametrize("passed", [False, True])
+def test_what_was_swept_is_told_where_a_limit_ends_it(passed: bool) -> None:
     problem = town(15, 4)
     task, whole = task_on(problem), solve(problem)
-    seen = {}
+    sweep = ROOM.sweep_on
 
-    def stop(*_: object) -> bool:
+    def stop(*work: Any) -> bool:
+        if passed:
+            sweep(*work)
         raise LimitError("The time limit of 1 s was reached.", limit="time")
 
     with (
@@ -351,9 +355,13 @@ def test_what_was_swept_is_told_where_a_limit_ends_it() -> None:
         with pytest.raises(LimitError):
             windowed_optimum(task)
         seen = dict(current().board.kept)
-    assert seen["system"] is seen["equations"].core
-    assert len(seen["guess"]) == seen["system"].nodes == int(task.open.sum())
+    lower, upper = seen["bounds"]
+    assert len(seen["guess"]) == len(lower) == len(upper) == int(task.open.sum())
     assert whole.outcome.name == "CERTIFIED"
+    assert (lower <= whole.upper[0][task.open]).all()
+    assert (upper >= whole.lower[0][task.open]).all()
+    assert np.isfinite(upper).all() == passed
+    assert (lower > 0.0).all() == passed
 
 
 @pytest.mark.parametrize("states", [3200, 5000])
@@ -379,3 +387,16 @@ def test_where_the_goal_costs_nothing_the_policy_arrives_all_the_same(monkeypatc
     solution = solve(problem)
     assert solution.engine == "windowed sweeps"
     assert solution.policy.choice.tolist() == [1, 2, 4]
+
+
+def test_what_is_left_of_a_window_is_guessed_from_steady_progress_only() -> None:
+    """A row that is found late makes values jump: that is no reason to give a window up."""
+    slow = [(k, 0.999**k) for k in range(1, 17)]
+    assert _visits_left(slow, 1e-6) > 1e4
+    assert _visits_left(slow[:7], 1e-6) == 0.0  # too early to tell
+    quick = [(k, 0.1**k) for k in range(1, 17)]
+    assert _visits_left(quick, 1e-20) == pytest.approx(4.0, abs=1.5)
+    assert _visits_left([(k, 1.0) for k in range(1, 17)], 1e-6) == np.inf
+    assert _visits_left([*slow, (17, 7.5), (18, 0.2), (19, 0.01)], 1e-6) == 0.0
+    steady = [(k, 50.0 - 6 * k) for k in range(1, 9)]
+    assert _visits_left(steady, 1e-6) < 40

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from ratherthan.model.mdp import Bools, Floats
 from ratherthan.model.policy import Policy
-from ratherthan.model.watch import room_for
 from ratherthan.solve.certify import Parts, Tight, chain_margin, never_falls, never_rises, optimum_bound
-from ratherthan.solve.chain import Evaluated, Guess, chain_of, evaluated, nodes_of
+from ratherthan.solve.chain import Evaluated, Guess, chain_of, evaluated
+from ratherthan.solve.equations import systems_of
 from ratherthan.solve.gathering import loops_in_doubt, most_reward
 from ratherthan.solve.goal import Goal, Kind, Task
 from ratherthan.solve.layered import Layered, layered_bounds, swept_bounds
@@ -23,12 +23,12 @@ from ratherthan.solve.policy_iteration import Found, PolicyIteration, iterate_po
 from ratherthan.solve.precise import width_aimed_at
 from ratherthan.solve.stopped import Equations, begun, written
 from ratherthan.solve.sweeps import Sweeps, Swept, arriving_rows, sweep_from_below, swept_between, upper_vector
-from ratherthan.solve.system import System, build_system, drift, rows_of
+from ratherthan.solve.system import System, drift, rows_of
 from ratherthan.solve.tied import first_tied, fixed_best, tied_choices
 from ratherthan.solve.trapped import ENGINE, suits_traps
 from ratherthan.solve.trapped.horizon import Horizon, within_steps
 
-__all__ = ["Method", "Optimum", "equations_of", "optimum"]
+__all__ = ["Method", "Optimum", "optimum"]
 
 Progress = Callable[[str], None]
 Method = PolicyIteration | Sweeps
@@ -36,9 +36,9 @@ Nodes = npt.NDArray[np.int64]
 
 TIES = np.array([1e-10, 1e-13, -np.inf])
 """Relative tolerances within which choices are tied, the next where the policy loses; at last the solver's rows alone."""
-BYTES = 64
-"""What equations take per branch of the model, with what is derived from them."""
 NO_METHOD = LinearMethod(lambda _: None)
+AFTER_TRAPS = PolicyIteration()
+"""Where elimination past traps had its turn before."""
 COARSE = 1e-10
 """Below which relative width of bounds windows are left to sweeps that go on."""
 LOSS = 1e-10
@@ -90,7 +90,7 @@ def _horizon(best: Optimum) -> Horizon | None:
     own, goal = task.open, task.goal
     if goal.counts_cost or not goal.maximise or not (best.upper[own] - best.lower[own] > OPEN).any():
         return None
-    found = within_steps(_systems(task)[2], best.values[own])
+    found = within_steps(systems_of(task)[2], best.values[own])
     if found is None:
         return None
     upper = task.fixed.copy()
@@ -109,7 +109,7 @@ def _optimum(task: Task, method: Method | None, progress: Progress | None, fines
     quick = _windowed(task, progress) if method is None and finest == 0 and width_aimed_at() >= COARSE else None
     if quick is not None:
         return quick
-    node, core, whole = _systems(task)
+    node, core, whole = systems_of(task)
     written(task, Equations(node, core, whole))
     plain = None if core is not whole or loops_in_doubt(task) else _layered_bounds(task, core)
     if method is None and plain is not None and plain.narrow:
@@ -183,7 +183,7 @@ def _by_equations(asked: _Asked, found: Found) -> Optimum:
     residual = _residual(core, goal.maximise, found.solved.high, found.solved.low)
     tied = fixed_best(task) | tied & task.open[goal.index.choice_to_state]
     best = Optimum(values, lower, upper, choice, tied, attained, found.engine, found.rounds + solves, residual, task)
-    if goal.counts_cost or not (upper - lower > OPEN).any() or core.nodes > SEVERAL:
+    if goal.counts_cost or not (upper - lower > OPEN).any() or core.nodes > SEVERAL or method is AFTER_TRAPS:
         return best
     past = _past_traps(task, (core, whole), node, finest, progress)
     return best if past is None or _width(past) >= _width(best) else past
@@ -245,7 +245,7 @@ def _likely(
     past = _past_traps(task, systems, node, finest, progress)
     if past is None or systems[0].nodes > SEVERAL or not (past.upper - past.lower > OPEN).any():
         return past
-    return _better(_optimum(task, PolicyIteration(), progress, finest), past)
+    return _better(_optimum(task, AFTER_TRAPS, progress, finest), past)
 
 
 def _past_traps(
@@ -360,50 +360,6 @@ def _swept(
     residual = _residual(core, goal.maximise, swept.values)
     tied = fixed_best(task) | tied & task.open[goal.index.choice_to_state]
     return Optimum(values, lower, upper, choice, tied, attained, "value iteration", swept.sweeps, residual, task)
-
-
-def equations_of(task: Task) -> Equations:
-    """Return the equations of a task."""
-    return Equations(*_systems(task))
-
-
-def _systems(task: Task) -> tuple[Nodes, System, System]:
-    """Return the node of each state, the system with end components collapsed, and that of the open states as they are."""
-    goal = task.goal
-    room_for(BYTES * goal.index.work, f"The equations of a model of {goal.index.work} branches")
-    single = nodes_of(task.open, task.fixed)
-    collapsed = task.open & (task.component >= 0)
-    whole = _system(goal, np.flatnonzero(task.allowed), single)
-    if not collapsed.any():
-        return single, whole, whole
-    representative = np.arange(len(single))
-    members = np.flatnonzero(collapsed)
-    first = np.full(int(task.component.max()) + 1, len(single))
-    np.minimum.at(first, task.component[members], members)
-    representative[members] = first[task.component[members]]
-    kept = task.open & (representative == np.arange(len(single)))
-    count = int(np.count_nonzero(kept))
-    node = np.where(task.fixed == 1.0, count + 1, count)
-    node[kept] = np.arange(count)
-    node[members] = node[representative[members]]
-    external = np.flatnonzero(task.allowed & ~task.internal)
-    return node, _system(goal, external, node), whole
-
-
-def _system(goal: Goal, rows: Nodes, node: Nodes) -> System:
-    """Return the system of some choices of a goal."""
-    return build_system(
-        goal.index,
-        goal.probability,
-        goal.cost,
-        rows,
-        node,
-        size=goal.size,
-        exact=goal.exact,
-        signed=goal.signed,
-        discount=goal.discount,
-        given=True,
-    )
 
 
 def _attaining(task: Task, core: System, node: Nodes, found: Found, finest: int) -> tuple[Nodes, Bools, Evaluated, int]:

@@ -82,7 +82,16 @@ def keeping(problem: Problem, levels: tuple[Level, ...]) -> Iterator[None]:
 def begun(task: Task) -> None:
     """Lay down what the graph decides of a task."""
     keep(
-        task=task, equations=None, system=None, lower=None, upper=None, guess=None, rows=None, solved=None, engine=None
+        task=task,
+        equations=None,
+        system=None,
+        lower=None,
+        upper=None,
+        bounds=None,
+        guess=None,
+        rows=None,
+        solved=None,
+        engine=None,
     )
     look()
 
@@ -235,7 +244,12 @@ def _bounded(task: Task, kept: Mapping[str, Any]) -> tuple[Floats, Floats, Float
         steps = graph.levels_to(goal.index, ~open_, open_, task.allowed)[open_]
         lower[open_] = LESS * float(goal.cost[task.allowed].min(initial=np.inf)) * np.maximum(steps, 0)
     equations: Equations | None = kept.get("equations")
-    if equations is not None and open_.any():
+    if kept.get("bounds") is not None:  # of the open states, proved by whoever laid them down
+        below, above = kept["bounds"]
+        lower[open_], upper[open_] = np.maximum(lower[open_], below), np.minimum(upper[open_], above)
+        guess = np.array(task.fixed)
+        guess[open_] = kept["guess"]
+    elif equations is not None and open_.any():
         parts = kept if kept.get("system") is equations.core else {}
         below, above = _proved(task, equations, parts)
         lower[open_] = np.maximum(lower[open_], below)

@@ -31,11 +31,11 @@ from ratherthan.errors import LimitError
 from ratherthan.model import graph
 from ratherthan.model._kernels import LEAST_WORK, compiled, is_compiled
 from ratherthan.model.mdp import Bools, Floats, Ints
-from ratherthan.model.watch import current, keep, room_for, unlimited
+from ratherthan.model.watch import current, keep, room_for
 from ratherthan.solve._kernels import Needs, Swept, scaling_needs, sinks_first, swept_rows
 from ratherthan.solve.chain import Evaluated
 from ratherthan.solve.goal import Kind, Task
-from ratherthan.solve.optimum import Optimum, equations_of
+from ratherthan.solve.optimum import Optimum
 from ratherthan.solve.precise import precision_wanted
 from ratherthan.solve.system import ROUNDING
 from ratherthan.solve.tied import first_tied, fixed_best
@@ -55,6 +55,8 @@ TIE = 4.0
 """Up to how many residuals a row may fall behind the best and be tied; the plan that takes such rows may lose as much."""
 ROOM = 1.0 + 1e-6
 TINY = 1e-15
+MOST_ABOVE = 0.999
+"""Above which need nothing is told of an upper bound when a limit stops the sweeps."""
 BYTES = 12, 16
 """Of memory per branch, and per choice."""
 LARGE = 30_000_000
@@ -92,7 +94,7 @@ def windowed_optimum(task: Task, settings: Windows | None = None, progress: Prog
     try:
         needs = _swept(swept, state, tied, settings, progress)
     except LimitError:
-        _keep(task, order, state)
+        _keep(task, order, swept, state)
         raise
     del swept  # what follows needs room
     return None if needs is None else _proved(task, state, (order, tied), needs)
@@ -183,12 +185,24 @@ def _proved(task: Task, state: Sweeping, found: tuple[Ints, Bools], shares: tupl
     return Optimum(values, lower, upper, choice, tied, attained, "windowed sweeps", sweeps, residual, task)
 
 
-def _keep(task: Task, order: Ints, state: Sweeping) -> None:
-    """Lay down what is known when a limit stops the sweeps."""
+def _keep(task: Task, order: Ints, swept: Swept, state: Sweeping) -> None:
+    """Lay down what is known when a limit stops the sweeps: values, and the bounds that scaling proves, which one pass tells."""
     if current().board.kept.get("task") is not task:
         return
-    with unlimited():
-        equations = equations_of(task)
-    guess = np.empty(len(task.open))
-    guess[order] = state.values[: len(order)]
-    keep(equations=equations, system=equations.core, guess=guess[task.open], engine="windowed sweeps")
+    guess, part = task.fixed.copy(), state.values[: len(order)]
+    guess[order] = part
+    limits = (0.0, (swept.longest + 8) * ROUNDING)
+    scratch = np.zeros(task.goal.index.choices, dtype=np.bool_)
+    needs: Needs = compiled(scaling_needs, max(len(swept.rows.target), LEAST_WORK))(
+        swept.rows, swept.source, state.values, limits, scratch
+    )
+    lower, upper = np.zeros(len(order)), np.full(len(order), np.inf)
+    if np.isfinite(part).all() and float(part.min()) >= 0.0:
+        below, above = needs.below * ROOM + TINY, needs.above * ROOM
+        if below < 1.0:
+            lower = np.maximum(np.nextafter((1.0 - below) * part, -np.inf), 0.0)
+        if above < MOST_ABOVE:
+            upper = np.nextafter((1.0 + above / (1.0 - above) * ROOM + TINY) * part, np.inf)
+    bounds = np.zeros(len(guess)), np.full(len(guess), np.inf)
+    bounds[0][order], bounds[1][order] = lower, upper
+    keep(guess=guess[task.open], bounds=(bounds[0][task.open], bounds[1][task.open]), engine="windowed sweeps")

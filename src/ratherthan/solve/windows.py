@@ -50,6 +50,8 @@ FAR = 0.1
 """What share of the layers must be behind before it is guessed from them how long a pass takes."""
 PATIENCE = 30
 """After how many visits of its nodes it is guessed how long a window takes."""
+LOOKS = 8
+"""After how many looks at it, at least."""
 POOR = 0.1
 """To what share a pass must bring the residual down."""
 
@@ -182,14 +184,18 @@ def sweep_on(rows: Ordered, state: Sweeping, settings: Windows, progress: Progre
 
 
 def _visits_left(seen: list[tuple[int, float]], tolerance: float) -> float:
-    """Return how much work it takes to come to a tolerance, if it goes on as it did in the later half of the work so far."""
-    work, change = seen[-1]
-    if len(seen) == 1:  # nothing to compare it with: no guess
+    """Return how much work it takes to come to a tolerance, if it goes on as it did in the later half of the work so far.
+
+    A row that is found late makes values jump once more: then nothing can be told yet.
+    """
+    later = seen[len(seen) // 2 :]
+    changes = [change for _, change in later]
+    if len(seen) < LOOKS or changes != sorted(changes, reverse=True):
         return 0.0
-    before, larger = next((entry for entry in reversed(seen) if 2 * entry[0] <= work), seen[0])
-    if change <= tolerance:
+    (begun, before), (work, now) = later[0], later[-1]
+    if now <= tolerance:
         return 0.0
-    return log(tolerance / change) / log(change / larger) * (work - before) if change < larger else np.inf
+    return log(tolerance / now) / log(now / before) * (work - begun) if now < before else np.inf
 
 
 def widened(state: Sweeping, before: float) -> bool:

@@ -14,6 +14,7 @@ graph says that it arrives.
 windows. Corrections: after 600 iterations of a Krylov solve, where factors would fill, or after rounds that gain nothing.
 """
 
-from ratherthan.solve.contracting.contraction import Contracted, chain_bounds_at_size, contracted, suits_contraction
+from ratherthan.solve.contracting.chains import chain_bounds_at_size
+from ratherthan.solve.contracting.contraction import Contracted, contracted, suits_contraction
 
 __all__ = ["Contracted", "chain_bounds_at_size", "contracted", "suits_contraction"]

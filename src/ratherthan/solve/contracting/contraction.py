@@ -12,19 +12,33 @@ from ratherthan.model._kernels import is_compiled
 from ratherthan.model.mdp import Bools, Floats
 from ratherthan.model.policy import Policy
 from ratherthan.model.watch import look
-from ratherthan.solve.certify import Parts, never_falls, never_rises, outward
 from ratherthan.solve.chain import Evaluated, Guess, chain_of, evaluated
-from ratherthan.solve.contracting.corrections import corrected, eliminable, repaired
+from ratherthan.solve.contracting.corrections import corrected, repaired
 from ratherthan.solve.contracting.discounting import discounted_values
-from ratherthan.solve.contracting.field import Field, begin_with, field_of, residual_of, swept
+from ratherthan.solve.contracting.eliminated import begin_exactly, improved
+from ratherthan.solve.contracting.field import BRIEFLY, Field, begin_with, field_of, residual_of, swept
 from ratherthan.solve.contracting.proof import bounded_by, gaps_of, margins_for
+from ratherthan.solve.eliminating import Factored
 from ratherthan.solve.goal import Task
 from ratherthan.solve.policy_iteration import rows_towards_sinks
 from ratherthan.solve.precise import width_aimed_at
 from ratherthan.solve.system import System
 from ratherthan.solve.tied import first_tied
 
-__all__ = ["Contracted", "chain_bounds_at_size", "contracted", "suits_contraction"]
+__all__ = [
+    "ENOUGH",
+    "EXACT",
+    "FINER",
+    "ROUGH",
+    "TRIES",
+    "Contracted",
+    "contracted",
+    "is_large",
+    "largest_share",
+    "suits_contraction",
+    "unit_of",
+    "valued",
+]
 
 Nodes = npt.NDArray[np.int64]
 
@@ -35,8 +49,11 @@ GOOD = 100.0
 FINER = 1e-2
 SWEPT, SHIFTED = "sweeps", "discounted sweeps"
 ROUGH = "policy iteration with rough solves"
+EXACT = "policy iteration by components"
 ENOUGH = 30.0
 """How many times that is enough."""
+ROOMY = 8.0
+"""How many times that sweeps go for at first where sums are discounted."""
 TRIES = 3
 
 
@@ -77,9 +94,14 @@ class _Work:
 
 def suits_contraction(task: Task, core: System) -> bool:
     """Return whether sweeps are worth a try: many states, and something that is counted."""
-    if not task.goal.counts_cost or core.nodes < FEWEST or len(core.target) > np.iinfo(np.int32).max:
+    return task.goal.counts_cost and is_large(core)
+
+
+def is_large(system: System) -> bool:
+    """Return whether a system has many nodes, but no more branches than are numbered here, and costs that are numbers."""
+    if system.nodes < FEWEST or len(system.target) > np.iinfo(np.int32).max:
         return False
-    return is_compiled(len(core.target)) and bool(np.isfinite(core.cost).all())
+    return is_compiled(len(system.target)) and bool(np.isfinite(system.cost).all())
 
 
 def contracted(
@@ -101,19 +123,20 @@ def contracted(
     core, whole = systems
     work = _Work(task=task, core=core, whole=whole, node=node)
     goal = task.goal
-    unit = _unit(core)
+    unit = unit_of(core)
     field = field_of(core, goal.maximise, discounted=goal.discount < 1.0)
+    equations = None
     if goal.discount == 1.0:
-        begin_with(field, rows_towards_sinks(core), unit=unit)
+        equations = _begun(field, rows_towards_sinks(core), unit)
     aim = width_aimed_at()
     wanted = aim * unit
     best: Contracted | None = None
     way: str | None = None
     for number in range(1, TRIES + 1):
-        way = _valued(field, goal.discount, wanted, unit, way)
+        way = valued(field, goal.discount, wanted, unit, (way, equations))
         if way is None:
             break
-        found = _proved(work, field, finest, way)._replace(rounds=number)
+        found = _proved(work, field, finest, way, equations)._replace(rounds=number)
         if best is None or found.width <= best.width:
             best = found
         if found.width <= ENOUGH * aim:
@@ -122,26 +145,43 @@ def contracted(
     return best, repaired(core, field.rows_taken()) if np.isfinite(field.values).all() else None
 
 
-def _valued(field: Field, discount: float, wanted: float, unit: float, before: str | None) -> str | None:
+def _begun(field: Field, rows: Nodes, unit: float) -> Factored | None:
+    """Take about the values of a policy that arrives; return its equations if they can be eliminated."""
+    equations = Factored(field.system)
+    if begin_exactly(field, equations, rows):
+        return equations
+    begin_with(field, rows, unit=unit)
+    return None
+
+
+def valued(
+    field: Field, discount: float, wanted: float, unit: float, known: tuple[str | None, Factored | None]
+) -> str | None:
     """Bring a field's values to a residual, by the way that led to a coarser one if any; return by which, None where none does."""
+    before, equations = known
     if discount < 1.0:
-        return SHIFTED if discounted_values(field, discount, wanted / unit) else None
+        return SHIFTED if discounted_values(field, discount, ROOMY * wanted / unit) else None
     single = len(field.rows.cost) == len(field.order)  # nothing to choose: no need to look around before going on
     first, finer = (1e-2 * unit, 1e-5) if single else (unit, 1e-2)
-    if before != ROUGH and swept(field, max(wanted, _floor(field)), unit=first, finer=finer):
+    visits = None if equations is None else (3.0 if single else 1.0) * BRIEFLY
+    if before not in (ROUGH, EXACT) and swept(
+        field, max(wanted, _floor(field)), unit=first, finer=finer, visits=visits
+    ):
         return SWEPT
     if not np.isfinite(field.values).all():
         return None
     floor = _floor(field)
     if before is not None and residual_of(field) <= floor:
         return before
-    if before is None and eliminable(field):
-        return None
+    if equations is not None and before != ROUGH:
+        rows = repaired(field.system, field.rows_taken())
+        if begin_exactly(field, equations, rows) if single else improved(field, equations, rows, unit=unit):
+            return EXACT
     coarse = wanted if before is not None else ENOUGH * wanted
     return ROUGH if corrected(field, max(coarse, floor), unit=unit) else None
 
 
-def _unit(system: System) -> float:
+def unit_of(system: System) -> float:
     """Return what a step costs, about."""
     size = np.abs(system.cost[system.cost != 0.0])
     return float(size.mean()) if len(size) else 1.0
@@ -152,13 +192,14 @@ def _floor(field: Field) -> float:
     return 1e-14 * float(np.abs(field.values).max())
 
 
-def _proved(work: _Work, field: Field, finest: int, engine: str) -> Contracted:
+def _proved(work: _Work, field: Field, finest: int, engine: str, equations: Factored | None) -> Contracted:
     """Return what can be proved of a field's values."""
     task, core, goal = work.task, work.core, work.task.goal
     look("proving the bounds")
     values = field.of_nodes() if goal.signed else np.maximum(field.of_nodes(), 0.0)
     gaps = gaps_of(core, values, goal.maximise, finest)
-    margin = margins_for(core, values, gaps, goal.discount, sweeping=engine != ROUGH)
+    exact = (equations, field.rows_taken()) if equations is not None and engine == EXACT else None
+    margin = margins_for(core, values, gaps, goal.discount, sweeping=engine != ROUGH, exact=exact)
     tied = task.internal | task.attaining
     tied[core.source[gaps.near]] = True
     choice = first_tied(task, tied)
@@ -186,65 +227,10 @@ def _width(work: _Work, bound: Floats, attained: Evaluated) -> float:
     size = np.abs(bound)
     if goal.signed:
         size = np.full(len(bound), max(float(size.max()), float(np.abs(work.core.cost).max())))
-    return _largest_share(np.abs(bound - other), size)
+    return largest_share(np.abs(bound - other), size)
 
 
-def chain_bounds_at_size(system: System, maximise: bool, discount: float) -> tuple[Floats, Floats, Floats] | None:
-    """Return the values of a system with one row per node and proved bounds, None where sweeps do not prove them.
-
-    Parameters
-    ----------
-    system : System
-        From every node the sinks are reached with probability 1.
-    maximise : bool
-        It makes no difference.
-    discount : float
-
-    Returns
-    -------
-    values, lower, upper : array of float, ``[n]``
-        The narrowest that were proved, where they are not as narrow as was aimed at.
-    """
-    if system.nodes < FEWEST or not is_compiled(len(system.target)) or not np.isfinite(system.cost).all():
-        return None
-    field = field_of(system, maximise, discounted=discount < 1.0)
-    unit, aim = _unit(system), width_aimed_at()
-    wanted = aim * unit
-    best: tuple[Floats, Floats, Floats] | None = None
-    way: str | None = None
-    for _ in range(TRIES):
-        way = _valued(field, discount, wanted, unit, way)
-        found = None if way is None else _around(system, field, discount, sweeping=way != ROUGH)
-        if found is None:
-            break
-        best = found
-        if _relative(system, found) <= ENOUGH * aim:
-            break
-        wanted *= FINER
-    return best
-
-
-def _around(system: System, field: Field, discount: float, *, sweeping: bool) -> tuple[Floats, Floats, Floats] | None:
-    """Return the values of a field with one row per node and proved bounds, None where these are not proved."""
-    values = field.of_nodes() if system.signed else np.maximum(field.of_nodes(), 0.0)
-    gaps = gaps_of(system, values, field.sign < 0.0)
-    margin = margins_for(system, values, gaps, discount, sweeping=sweeping)
-    if margin is None or not (never_falls(system, values, -margin) and never_rises(system, values, margin)):
-        return None
-    lower, upper = outward(Parts(values, np.zeros(len(values))), margin, signed=system.signed)
-    return np.clip(values, lower, upper), lower, upper
-
-
-def _relative(system: System, found: tuple[Floats, Floats, Floats]) -> float:
-    """Return the largest relative width of bounds."""
-    values, lower, upper = found
-    size = np.abs(values)
-    if system.signed:
-        size = np.full(len(values), max(float(size.max()), float(np.abs(system.cost).max())))
-    return _largest_share(upper - lower, size)
-
-
-def _largest_share(wide: Floats, size: Floats) -> float:
+def largest_share(wide: Floats, size: Floats) -> float:
     """Return the largest width in relation to a size, ∞ where one is no number."""
     relative = np.divide(wide, size, out=np.where(wide == 0.0, 0.0, np.inf), where=size > 0.0)
     return float(relative.max()) if np.isfinite(relative).all() else np.inf

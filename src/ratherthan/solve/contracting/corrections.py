@@ -29,13 +29,12 @@ from ratherthan.model.mdp import Floats
 from ratherthan.model.watch import look
 from ratherthan.solve import _kernels as shared
 from ratherthan.solve.contracting.field import Field, residual_of, swept_whole
-from ratherthan.solve.sparse import fills
 from ratherthan.solve.system import System
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-__all__ = ["corrected", "eliminable", "repaired"]
+__all__ = ["corrected", "repaired"]
 
 Nodes = npt.NDArray[np.int64]
 
@@ -88,13 +87,6 @@ def _moved(field: Field, tolerance: float) -> bool:
         return False
     field.values[:n] += step
     return True
-
-
-def eliminable(field: Field) -> bool:
-    """Return whether the equations of the rows taken can be eliminated without much fill."""
-    n = len(field.order)
-    inner = _matrix(field)[:, :n].tocoo()
-    return not fills(np.arange(n), inner.row.astype(np.int64), inner.col.astype(np.int64))
 
 
 def _matrix(field: Field) -> csr_array[Any]:

@@ -31,9 +31,9 @@ from ratherthan.solve.system import System, drift
 __all__ = ["discounted_values"]
 
 
-SWEEPS = 3
+SWEEPS = 5
 """Sweeps there and back between two looks at the steps."""
-MOST_LOOKS = 80
+MOST_LOOKS = 24
 """After how many looks sweeps end; and how many there may be to go for sweeps to be worth it."""
 ROUNDING = 4e-15
 """Up to which share of the values steps can be told."""

@@ -33,7 +33,7 @@ from ratherthan.solve._kernels import Ordered, ordered_rows
 from ratherthan.solve.contracting._kernels import first_values, gaps_of, relax_all, relax_windows
 from ratherthan.solve.system import System, rows_of
 
-__all__ = ["Field", "begin_with", "field_of", "residual_of", "swept", "swept_whole"]
+__all__ = ["BRIEFLY", "Field", "begin_with", "field_of", "residual_of", "swept", "swept_whole"]
 
 Nodes = npt.NDArray[np.int64]
 
@@ -45,6 +45,8 @@ MOST_VISITS = 400.0
 """How often every node may be visited on average, where it helps."""
 FEW_VISITS = 100.0
 """How often where all layers lie in one window."""
+BRIEFLY = 80.0
+"""How often where equations can be eliminated instead."""
 MOST_AT_ONCE = 150.0
 """How often in one pass."""
 MOST_PASSES = 14
@@ -97,6 +99,10 @@ class Field:
     def set_to(self, values: Floats) -> None:
         """Take values by node."""
         self.values[:-2] = self.sign * values[self.order]
+
+    def take(self, rows: Nodes) -> None:
+        """Take rows of the system, one per node."""
+        self.taken[:] = self.rows.node_to_rows[:-1] + (rows - self.system.node_to_rows[:-1])[self.order]
 
     def rows_taken(self) -> Nodes:
         """Return the row of the system taken at each node, ``[n]``."""
@@ -187,7 +193,15 @@ def begin_with(field: Field, rows: Nodes, *, unit: float) -> bool:
     return done
 
 
-def swept(field: Field, wanted: float, tolerance: Floats | None = None, *, unit: float, finer: float = 0.01) -> bool:
+def swept(
+    field: Field,
+    wanted: float,
+    tolerance: Floats | None = None,
+    *,
+    unit: float,
+    finer: float = 0.01,
+    visits: float | None = None,
+) -> bool:
     """Sweep windows until the residual is at most `wanted`; return whether it is.
 
     Parameters
@@ -202,14 +216,17 @@ def swept(field: Field, wanted: float, tolerance: Floats | None = None, *, unit:
         What a step costs, about: the first pass is as coarse as that.
     finer : float
         How much smaller changes may be from pass to pass.
+    visits : float, optional
+        How often every node may be visited on average.
     """
     fine = np.ones(len(field.order)) if tolerance is None else tolerance[field.order]
     coarse = max(1e-3 * unit, 0.3 * wanted)
-    left = (FEW_VISITS if field.flat else MOST_VISITS) * len(field.order)
-    once = MOST_AT_ONCE * len(field.order)
+    left = (visits or (FEW_VISITS if field.flat else MOST_VISITS)) * len(field.order)
+    once, most = MOST_AT_ONCE * len(field.order), int(np.iinfo(np.int32).max if visits is None else 0.5 * visits)
     width, residual = WIDTH, np.inf
     for number in range(1, MOST_PASSES + 1):
-        left -= _passed(field, np.maximum(coarse * fine, 1e-16 * np.abs(field.values[:-2])), width, min(left, once))
+        least = np.maximum(coarse * fine, 1e-16 * np.abs(field.values[:-2]))
+        left -= _passed(field, least, width, min(left, once), most)
         before, residual = residual, _relative(field, fine)
         look(f"sweeps, pass {number}: residual {residual:.1e}")
         if residual <= wanted or not np.isfinite(residual) or left <= 0:
@@ -231,15 +248,16 @@ def _relative(field: Field, fine: Floats) -> float:
     return float((np.abs(gaps) / fine).max())
 
 
-def _passed(field: Field, tolerance: Floats, width: int, left: float) -> float:
-    """Pass through all windows, a slice of work at a time; return how many nodes were visited."""
+def _passed(field: Field, tolerance: Floats, width: int, left: float, most: int) -> float:
+    """Pass through all windows, a slice of work at a time, each swept at most so often; return how many nodes were visited."""
     n, kernel = len(field.order), compiled(relax_windows, field.work)
     once = max(int(SLICE * n / max(field.work, 1)), 1000)
-    layer, keeping, spent = 0, 0, 0.0
+    layer, keeping, made, spent = 0, 0, 0, 0.0
     while layer < len(field.layers) - 1 and spent < left:
         look()
-        turn = kernel(field.rows, field.layers, field.values, field.taken, tolerance, (layer, keeping, width, once))
-        layer, keeping, spent = turn.layer, turn.keeping, spent + turn.spent
+        place, limits = (layer, keeping, made), (width, most, once)
+        turn = kernel(field.rows, field.layers, field.values, field.taken, tolerance, place, limits)
+        layer, keeping, made, spent = turn.layer, turn.keeping, turn.made, spent + turn.spent
     return spent
 
 

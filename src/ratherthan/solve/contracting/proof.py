@@ -27,15 +27,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from ratherthan.model.mdp import Bools, Floats
 from ratherthan.solve.certify import Parts, never_falls, never_rises, nowhere_negative, outward
 from ratherthan.solve.contracting.corrections import corrected, repaired
+from ratherthan.solve.contracting.eliminated import collected
 from ratherthan.solve.contracting.field import field_of, swept
+from ratherthan.solve.eliminating import Factored
 from ratherthan.solve.system import System, drift
 
 __all__ = ["Gaps", "bounded_by", "gaps_of", "margins_for"]
 
+Nodes = npt.NDArray[np.int64]
 
 TIE = 4.0
 """Up to how many residuals a row may fall behind the best and be near it."""
@@ -79,7 +83,15 @@ def gaps_of(system: System, values: Floats, maximise: bool, finest: int = 0) -> 
     return Gaps(gap, error, behind <= room, residual)
 
 
-def margins_for(system: System, values: Floats, gaps: Gaps, discount: float, *, sweeping: bool = True) -> Floats | None:
+def margins_for(
+    system: System,
+    values: Floats,
+    gaps: Gaps,
+    discount: float,
+    *,
+    sweeping: bool = True,
+    exact: tuple[Factored, Nodes] | None = None,
+) -> Floats | None:
     """Return a margin around values that is worth a try, ``[n]``; None where none was found.
 
     Parameters
@@ -91,6 +103,8 @@ def margins_for(system: System, values: Floats, gaps: Gaps, discount: float, *, 
         1 where nothing is discounted.
     sweeping : bool
         Whether sweeps led to the values, and will to a margin.
+    exact : tuple, optional
+        Equations that led to the values, and the rows to begin with: they will lead to a margin.
     """
     slack = gaps.slack
     if not (np.isfinite(gaps.residual) and np.isfinite(slack[gaps.near]).all()):  # beyond what doubles hold
@@ -102,15 +116,20 @@ def margins_for(system: System, values: Floats, gaps: Gaps, discount: float, *, 
         share = float((np.maximum(falls, 0.0) / system.cost).max()) * ROOM + 1e-15
         if share < 1e-3:
             return share * ROOM * np.abs(values)
-    return _collected(system, gaps, sweeping)
+    return _collected(system, gaps, sweeping, exact)
 
 
-def _collected(system: System, gaps: Gaps, sweeping: bool) -> Floats | None:
-    """Return the largest expected sum of slack, about; None where sweeps come to no end."""
+def _collected(system: System, gaps: Gaps, sweeping: bool, exact: tuple[Factored, Nodes] | None) -> Floats | None:
+    """Return the largest expected sum of slack, about; None where there is none, or sweeps come to no end."""
     begin = np.asarray(system.node_to_rows[:-1], dtype=np.int64)
     slack = gaps.slack
     slack = np.maximum(slack, TINY * float(slack[gaps.near].max()) + 1e-300)
     pay = 2.0 * slack
+    if exact is not None:
+        equations, rows = exact
+        behind = gaps.error - gaps.gap
+        pay = np.where(gaps.near, pay, behind + gaps.error)
+        return collected(equations, pay, np.where(gaps.near, slack, behind), rows)
     near = np.where(gaps.near, pay / system.leave, np.inf)
     tolerance = 0.25 * np.minimum.reduceat(near, begin)
     other = 2.0 * gaps.error - gaps.gap + 2.0 * tolerance[system.row_node] * system.leave

@@ -1,19 +1,16 @@
-"""Rows of a system and values in two parts enter; exact drifts, swept values and solutions leave: loops for models with traps.
+"""Rows of a system and values in two parts enter; exact drifts and swept values leave: loops for models with traps.
 
-See `exact` for the arithmetic in two parts, `factored` for what is eliminated, `traps` for the sweeps, and
-`ratherthan.model._kernels` for how kernels run.
+See `exact` for the arithmetic in two parts, `traps` for the sweeps, and `ratherthan.model._kernels` for how kernels run.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ratherthan.model.mdp import Bools, Floats
 
-__all__ = ["Pool", "exact_rows", "same_components", "substitute_nodes", "sweep_rows"]
+__all__ = ["exact_rows", "sweep_rows"]
 
 Ints64 = npt.NDArray[np.int64]
 Numbers = npt.NDArray[np.int32]
@@ -132,76 +129,3 @@ def sweep_rows(
         if moving == 0:
             break
     return changed, moving, made
-
-
-class Pool(NamedTuple):
-    """Factors of rows inside their blocks, wherever in the arrays they lie: to nodes before (`low`), and after them (`high`)."""
-
-    low_from: Ints64  # [n]
-    low_end: Ints64  # [n]
-    low_to: Ints64
-    low: Floats
-    high_from: Ints64  # [n]
-    high_end: Ints64  # [n]
-    high_to: Ints64
-    high: Floats
-    kept: Floats  # [n]
-
-
-def substitute_nodes(
-    sequence: Ints64,
-    blocks: Ints64,
-    component: Ints64,
-    rows: tuple[Ints64, Ints64, Floats],
-    pool: Pool,
-    right: Floats,
-) -> Floats:
-    """Return x with (I - Q) x = right; block k holds the nodes ``sequence[blocks[k]:blocks[k+1]]``, and leads to blocks before.
-
-    `rows` are the compressed rows of Q.
-    """
-    begin, target, share = rows
-    n = len(right)
-    x = np.zeros(n, np.float64)
-    for k in range(len(blocks) - 1):
-        for i in range(blocks[k], blocks[k + 1]):
-            s = sequence[i]
-            total = right[s]
-            for b in range(begin[s], begin[s + 1]):
-                t = target[b]
-                if t < n and component[t] != component[s]:
-                    total += share[b] * x[t]
-            for p in range(pool.low_from[s], pool.low_end[s]):
-                total += pool.low[p] * x[pool.low_to[p]]
-            x[s] = total / pool.kept[s]
-        for j in range(blocks[k + 1] - blocks[k]):
-            s = sequence[blocks[k + 1] - 1 - j]
-            total = x[s]
-            for p in range(pool.high_from[s], pool.high_end[s]):
-                total += pool.high[p] * x[pool.high_to[p]]
-            x[s] = total
-    return x
-
-
-def same_components(before: Ints64, after: Ints64, changed: Bools) -> Bools:
-    """Return, for each strong component of `after`, whether it is one of `before` in none of whose nodes anything changed."""
-    count, known = 0, 0
-    for s in range(len(after)):
-        count = max(count, after[s] + 1)
-        known = max(known, before[s] + 1)
-    old = np.full(count, -1, np.int64)
-    size = np.zeros(count, np.int64)
-    old_size = np.zeros(known, np.int64)
-    same = np.ones(count, np.bool_)
-    for s in range(len(after)):
-        k, o = after[s], before[s]
-        if old[k] == -1:
-            old[k] = o
-        if changed[s] or old[k] != o:
-            same[k] = False
-        size[k] += 1
-        old_size[o] += 1
-    for k in range(count):
-        if size[k] != old_size[old[k]]:
-            same[k] = False
-    return same

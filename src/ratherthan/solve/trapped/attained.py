@@ -10,14 +10,13 @@ import numpy.typing as npt
 
 from ratherthan.model.mdp import Bools, Floats
 from ratherthan.model.policy import Policy
-from ratherthan.model.watch import look
 from ratherthan.solve.chain import Evaluated, Guess, chain_of, evaluated
 from ratherthan.solve.goal import Task
 from ratherthan.solve.system import System
 from ratherthan.solve.tied import first_tied, tied_choices
 from ratherthan.solve.trapped.exact import is_exact
-from ratherthan.solve.trapped.proof import TIES, bound_of_all, margin_of_tied
-from ratherthan.solve.trapped.traps import PLATEAUS, Trapped, avoid_traps, on_plateaus
+from ratherthan.solve.trapped.proof import TIES, bound_on_plateaus, margin_of_tied
+from ratherthan.solve.trapped.traps import Trapped, avoid_traps
 
 __all__ = ["Past", "past_traps"]
 
@@ -66,7 +65,7 @@ def past_traps(
     if progress is not None:
         progress("proving the bounds")
     own = node[task.open]
-    bound = _bound(task, systems, own, found, progress)
+    bound = bound_on_plateaus(systems, own, found, task.goal.maximise, progress)
     several = np.bincount(own, minlength=core.nodes) > 1
     chosen, margin = margin_of_tied(core, found, several, len(TIES) - 1 if finest > 0 else 0)
     tied = tied_choices(task, core, np.where(chosen, 0.0, 1.0), np.zeros(core.rows), found.rows)
@@ -77,23 +76,6 @@ def past_traps(
     gain = np.maximum.reduceat(found.drift if task.goal.maximise else -found.drift, core.node_to_rows[:-1])
     residual = float(np.abs(gain).max())
     return Past(values, bound, choice, tied, attained, found.rounds, residual)
-
-
-def _bound(
-    task: Task, systems: tuple[System, System], own: Nodes, found: Trapped, progress: Progress | None
-) -> Floats | None:
-    """Return the bound that no policy beats, ``[N]``, with plateaus of one height after the other; None if none is proved."""
-    core, whole = systems
-    for share in PLATEAUS:
-        look()
-        smooth = on_plateaus(core, found, share, task.goal.maximise, progress)
-        if smooth is None:
-            continue
-        made, node, best = smooth
-        bound = bound_of_all(made, whole, node[own], best, task.goal.maximise)
-        if bound is not None:
-            return bound
-    return None
 
 
 def _guess(task: Task, found: Trapped, margin: Floats, node: Nodes) -> Guess:

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ratherthan.model import graph
 from ratherthan.model.mdp import Floats
+from ratherthan.solve.eliminating import Factored
 from ratherthan.solve.system import System
 from ratherthan.solve.trapped.exact import is_exact
-from ratherthan.solve.trapped.factored import Factored
-from ratherthan.solve.trapped.proof import bound_of_all
-from ratherthan.solve.trapped.traps import PLATEAUS, improved_in_two_parts, on_plateaus
+from ratherthan.solve.trapped.proof import bound_on_plateaus
+from ratherthan.solve.trapped.traps import improved_in_two_parts
 
 __all__ = ["chain_past_traps"]
 
@@ -29,22 +28,12 @@ def chain_past_traps(system: System) -> tuple[Floats | None, Floats | None] | No
     """
     if not is_exact(system):
         return None
-    ends = np.arange(system.nodes + 2) >= system.nodes
-    equations = Factored(system, graph.levels_to(system.index, ends, ~ends)[: system.nodes])
+    equations = Factored(system)
     if not equations.follow(np.arange(system.nodes)):
         return None
     found = improved_in_two_parts(system, maximise=True, equations=equations, most=1)
     if found is None:
         return None
-    bounds: list[Floats | None] = []
-    for maximise in (False, True):
-        bound = None
-        for share in PLATEAUS:
-            smooth = on_plateaus(system, found, share, maximise)
-            if smooth is not None:
-                made, node, best = smooth
-                bound = bound_of_all(made, system, node[: system.nodes], best, maximise)
-            if bound is not None:
-                break
-        bounds.append(bound)
-    return bounds[0], bounds[1]
+    own = np.arange(system.nodes)
+    lower, upper = (bound_on_plateaus((system, system), own, found, maximise) for maximise in (False, True))
+    return lower, upper

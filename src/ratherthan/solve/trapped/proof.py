@@ -13,24 +13,30 @@ Nothing here needs to be right for a bound to be sound: the check decides.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
 from ratherthan.model.mdp import Bools, Floats
+from ratherthan.model.watch import look
 from ratherthan.solve.certify import never_falls, never_rises
+from ratherthan.solve.eliminating import Factored
 from ratherthan.solve.policy_iteration import least_rows
 from ratherthan.solve.system import System, two_sum
 from ratherthan.solve.trapped.exact import exact_drift, exact_sum
-from ratherthan.solve.trapped.factored import Factored
-from ratherthan.solve.trapped.traps import Trapped
+from ratherthan.solve.trapped.traps import PLATEAUS, Trapped, on_plateaus
 
-__all__ = ["TIES", "bound_of_all", "margin_of_tied", "tied_rows"]
+__all__ = ["TIES", "bound_of_all", "bound_on_plateaus", "margin_of_tied", "tied_rows"]
 
 Nodes = npt.NDArray[np.int64]
 Pair = tuple[Floats, Floats]
+Progress = Callable[[str], None]
 
 SCALES = (1.0, 64.0)
 MOST_ROUNDS = 30
+MOST_LEVELS = 4
+"""How often plateaus are looked for among plateaus."""
 FLOOR = 1e-300
 """Added to δ where it is positive, so that it does not vanish in products of probabilities."""
 REFINEMENTS = 2
@@ -49,6 +55,43 @@ def tied_rows(system: System, found: Trapped, share: float | None) -> Bools:
         tied = np.abs(found.drift) <= share * np.abs(found.high)[system.row_node] + 4.0 * found.error
     tied[found.rows] = True
     return tied
+
+
+def bound_on_plateaus(
+    systems: tuple[System, System], own: Nodes, found: Trapped, maximise: bool, progress: Progress | None = None
+) -> Floats | None:
+    """Return the bound that no policy beats, ``[N]``, with plateaus of one height after the other; None if none is proved.
+
+    What is collapsed may lead into each other with hardly a change, too: so plateaus are looked for among plateaus.
+
+    Parameters
+    ----------
+    systems : tuple of System
+        With end components collapsed, and as it is.
+    own : array of int, ``[N]``
+        The node of the first that each node of the second is collapsed into.
+    found : Trapped
+        The optimum of the first, nearly.
+    maximise : bool
+    progress : callable, optional
+    """
+    core, whole = systems
+    for share in PLATEAUS:
+        made, best, into = core, found, own
+        for _ in range(MOST_LEVELS):
+            look()
+            smooth = on_plateaus(made, best, share, maximise, progress)
+            if smooth is None:
+                break
+            further, node, best = smooth
+            into = node[into]
+            bound = bound_of_all(further, whole, into, best, maximise)
+            if bound is not None:
+                return bound
+            if further.nodes == made.nodes:
+                break
+            made = further
+    return None
 
 
 def bound_of_all(core: System, whole: System, node: Nodes, found: Trapped, maximise: bool) -> Floats | None:

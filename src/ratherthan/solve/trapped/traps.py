@@ -4,8 +4,9 @@ Maps with traps are hard for sweeps: a policy may wander about safely for 1e5 st
 after as many sweeps, and what seems settled is not. They are hard for bounds, too, as a policy may wander near an end component
 for far longer and lose hardly anything. Equations do not mind, and the graph of one policy has small strong components.
 
-1. *Sweeps* in place, in the order of distance from the goal, from 0 on: they find nearly the right rows at next to no cost.
-2. *Policy iteration* (Howard 1960): the equations of the present rows are solved (`factored`), and some sweeps start from their
+1. *Sweeps* in place, in the order of distance from the end that is wanted, from 0 on: they find nearly the right rows at next to no
+   cost.
+2. *Policy iteration* (Howard 1960): the equations of the present rows are solved (`eliminating`), and some sweeps start from their
    solution. It lies below the largest value and above the least, so every sweep goes the right way, and every row that changes
    is better. A change must gain more than a share of the value that shrinks from round to round, so that only components are
    eliminated anew in which something was to be gained. It ends when no row gains anything that doubles can tell.
@@ -34,15 +35,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ratherthan.model import graph
-from ratherthan.model._kernels import compiled
+from ratherthan.model._kernels import compiled, is_compiled
 from ratherthan.model.mdp import Floats
 from ratherthan.model.watch import look
 from ratherthan.solve._kernels import Ordered, ordered_rows
+from ratherthan.solve.eliminating import Factored
 from ratherthan.solve.policy_iteration import best_rows, least_rows
 from ratherthan.solve.system import System, drift, exchanged, two_sum
 from ratherthan.solve.trapped._kernels import sweep_rows
 from ratherthan.solve.trapped.exact import GRAIN, exact_drift
-from ratherthan.solve.trapped.factored import Factored
 from ratherthan.solve.trapped.plateaus import flattened
 
 __all__ = ["PLATEAUS", "Trapped", "Traps", "avoid_traps", "improved_in_two_parts", "on_plateaus"]
@@ -54,13 +55,15 @@ FIRST_SWEEPS = 100
 """Sweeps before the first equations."""
 SLICE = 20_000_000
 """Branches to sweep over between two looks."""
+PLAIN = 200_000
+"""Branches to sweep over at most where sweeps are not compiled: the rest is left to equations."""
 COARSE, FINE = 1e-3, 1e-13
 """The share of a value that a row must gain to change, in the first round and at last."""
 FINER = 0.003
 """By what that is multiplied from round to round."""
 CAUTION = 4.0
 """How many errors of a drift a gain must be, where drifts are in two parts."""
-PLATEAUS = (1e-16, 1e-18, 1e-14, 1e-12)
+PLATEAUS = (1e-14, 1e-16, 1e-12, 1e-18)
 """Up to which share of the value steps of a plateau change it, the next one if the one before came to nothing."""
 MOST_REFINEMENTS = 12
 MOST_EXACT = 30
@@ -126,7 +129,7 @@ def avoid_traps(
     """
     settings = settings or Traps()
     swept = _Sweeps(system, maximise)
-    equations = Factored(system, swept.level)
+    equations = Factored(system)
     swept.run(FIRST_SWEEPS, COARSE)
     number = _iterated(swept, equations, (COARSE, settings), progress)
     found = None if number == 0 else improved_in_two_parts(system, maximise, equations, most=1)
@@ -154,15 +157,14 @@ def _iterated(
 
 
 class _Sweeps:
-    """The rows of a system in the order of distance from the goal, values, and the rows taken."""
+    """The rows of a system in the order of distance from the end that is wanted, values, and the rows taken."""
 
     def __init__(self, system: System, maximise: bool) -> None:
         n = system.nodes
         self.system, self.sign = system, 1.0 if maximise else -1.0
         ends = np.arange(n + 2) >= n
-        self.level = graph.levels_to(system.index, ends, ~ends)[:n]
-        one = np.arange(n + 2) == n + 1
-        distance = graph.levels_to(system.index, one, ~ends)[:n]
+        wanted = np.arange(n + 2) == (n + 1 if maximise else n)
+        distance = graph.levels_to(system.index, wanted, ~ends)[:n]
         self.order = np.argsort(distance, kind="stable")
         rank = np.arange(n + 2)
         rank[self.order] = np.arange(n)
@@ -183,9 +185,11 @@ class _Sweeps:
 
     def run(self, sweeps: int, gain: float) -> int:
         """Sweep; return at how many nodes the row changed."""
-        before = self.taken.copy()
-        kernel = compiled(sweep_rows, len(self.ordered.target))
-        at_once = max(1, min(sweeps, SLICE // len(self.ordered.target)))
+        before, work = self.taken.copy(), len(self.ordered.target)
+        kernel = compiled(sweep_rows, work)
+        if not is_compiled(work):
+            sweeps = max(1, min(sweeps, PLAIN // work))
+        at_once = max(1, min(sweeps, SLICE // work))
         made = 0
         while made < sweeps:
             look()
@@ -284,20 +288,29 @@ def on_plateaus(
         best = np.maximum if maximise else np.minimum
         values = np.full(made.nodes, -np.inf if maximise else np.inf)
         best.at(values, node[: system.nodes], found.high)
-        total = drift(made, values)[0]
-        rows = least_rows(made, (-total if maximise else total) / made.leave)
-        taken = np.zeros(system.rows, dtype=np.bool_)
-        alone = np.bincount(node[: system.nodes], minlength=made.nodes) == 1
-        taken[found.rows[alone[node[: system.nodes]]]] = True
-        kept = np.flatnonzero(taken[made.source])
-        rows[made.row_node[kept]] = kept
+        if not equations.follow(found.rows):
+            return None
+        rows = _rows_towards_ends(made, node[: system.nodes], found.rows, equations.solve(np.ones(system.nodes)))
         swept = _Sweeps(made, maximise)
-        equations = Factored(made, swept.level)
+        equations = Factored(made)
         swept.start(values, rows)
         if _iterated(swept, equations, (FINE, Traps()), progress, " on plateaus") == 0:
             return None
     smooth = improved_in_two_parts(made, maximise, equations, progress=progress)
     return None if smooth is None else (made, node, smooth)
+
+
+def _rows_towards_ends(made: System, node: Nodes, rows: Nodes, steps: Floats) -> Nodes:
+    """Return for every node of a system with plateaus the row of that member which has the fewest steps to go, ``[n]``.
+
+    With h the expected number of `steps` of a policy of the system as it was, and the least of its members' for a plateau, every row
+    taken so leads to less on average, by 1: the rows arrive, in so many steps at most, and lose nothing that could be told.
+    """
+    nearest = np.lexsort((steps, node))
+    first = nearest[np.searchsorted(node[nearest], np.arange(made.nodes))]
+    wanted = rows[first]
+    taken = made.source == wanted[made.row_node]
+    return least_rows(made, np.where(taken, -1.0 - made.leave, -made.leave))
 
 
 def refined_values(equations: Factored) -> tuple[Floats, Floats] | None:

@@ -1,15 +1,25 @@
 """A system and one row per node enter, again and again with some rows changed; what solves their equations leaves.
 
+I - Q, with Q the rows without their loops, each divided by its probability to leave its node, is an M-matrix whose rows sum to what goes
+to the sinks. Its diagonal is never stored but is the sum of the rest of its row and of what leaves, so that nothing cancels and
+every entry of the inverse keeps its relative accuracy, however slowly the chain leaves (Grassmann, Taksar and Heyman 1985; O'Cinneide
+1993).
+
 The graph of one policy falls into strong components, most of them small, also where the graph of all choices is one component:
-a policy seldom leads back. I - Q is eliminated without subtraction component by component (`sparse` has the reasons and the
-references), and a component's factors depend on nothing but the rows of its own nodes. So from one policy to the next only
-those components are eliminated again in which a row changed, or that fell apart or grew together. In policy iteration that
-is nearly all of the work in the first rounds, and hardly any in the last ones.
+a policy seldom leads back. They are eliminated one by one, each after those it leads to, and a component's factors depend on
+nothing but the rows of its own nodes. So from one policy to the next only those components are eliminated again in which a row
+changed, or that fell apart or grew together. In policy iteration that is nearly all of the work in the first rounds, and hardly
+any in the last ones.
 
-Inside a component the order is that of minimum degree on the symmetric pattern (of SuperLU); nodes with very many branches, such as
-a collapsed end component that lies along a whole map, go last, where they fill one row and one column.
+**Giving up.** Factors are counted before they are made (`ordering`). Where they are too many, nothing is eliminated: graphs without
+small separators, which sweeps and Krylov methods solve. Elimination itself goes slice by slice, between which limits are looked at,
+and ends after so many steps.
 
-It gives up where the factors of a component would fill: graphs without small separators, which sweeps and Krylov methods solve.
+References
+----------
+W. K. Grassmann, M. I. Taksar, D. P. Heyman, Regenerative Analysis and Steady State Distributions for Markov Chains,
+Oper. Res. 33(5), 1985.  C. A. O'Cinneide, Entrywise perturbation theory and error analysis for Markov chains, Numer. Math. 65,
+1993.
 """
 
 from __future__ import annotations
@@ -22,24 +32,28 @@ import numpy.typing as npt
 from ratherthan.model._kernels import compiled, strong_components
 from ratherthan.model.mdp import Floats
 from ratherthan.model.watch import look
-from ratherthan.solve._kernels import Rows, eliminate, elimination_tree, fill_of
+from ratherthan.solve.eliminating._kernels import (
+    Factors,
+    Pool,
+    Rows,
+    Scratch,
+    eliminate_rows,
+    same_components,
+    substitute_nodes,
+)
+from ratherthan.solve.eliminating.ordering import LEAST_FILL, Order, by_component, ordered
 from ratherthan.solve.system import System, rows_of
-from ratherthan.solve.trapped._kernels import Pool, same_components, substitute_nodes
 
 __all__ = ["Factored"]
 
 Nodes = npt.NDArray[np.int64]
 
-MOST_FILL = 150
-"""Entries per row that factors may have."""
-LEAST_FILL = 3_000_000
-"""Up to how many entries they may have in any case."""
-MOST_LEVEL_FILL = 4_000
-"""Entries per row that they may have in the order of levels, which is by far not the best, to be tried at all."""
-HUB = 20.0
-"""How many times the mean number of branches make a node a hub."""
 WASTE = 3
 """How many times the live factors the arrays may hold before all are made anew."""
+SLICE = 100_000_000
+"""Steps of elimination between two looks, some tenths of a second."""
+MOST_STEPS = 5_000_000_000
+"""Steps after which elimination is given up, some ten seconds."""
 
 
 class Factored:
@@ -49,14 +63,11 @@ class Factored:
     ----------
     system : System
         None of whose nodes a policy stays at for ever.
-    level : array of int, ``[n]``
-        How many branches each node is from a sink.
     """
 
-    def __init__(self, system: System, level: Nodes) -> None:
+    def __init__(self, system: System) -> None:
         n = system.nodes
-        self.system, self.level, self.work = system, level, len(system.target)
-        self.rows = np.full(n, -1, dtype=np.int64)
+        self.system, self.work = system, len(system.target)
         self.chain: System | None = None
         self.component = np.arange(n)
         self.rank = np.zeros(n, dtype=np.int64)
@@ -89,6 +100,8 @@ class Factored:
         """
         look()
         system, n = self.system, self.system.nodes
+        if self.chain is not None and np.array_equal(rows, self.rows):
+            return True
         chain = rows_of(system, rows)
         share: Floats = (
             np.where(chain.target != chain.branch_node, chain.probability, 0.0) / chain.leave[chain.branch_node]
@@ -105,10 +118,10 @@ class Factored:
         self.chain, self.component, self.rows = chain, component, rows
         self._matrix = (chain.row_to_branches, chain.target, share)
         if anew.any() and not self._eliminated(np.flatnonzero(anew), share):
+            self._empty()
             return False
-        sequence = np.lexsort((self.rank, component))
         sizes = np.bincount(component)
-        self._sequence = sequence, np.concatenate([[0], np.cumsum(sizes)])
+        self._sequence = by_component(component, self.rank), np.concatenate([[0], np.cumsum(sizes)])
         return True
 
     def solve(self, right: Floats) -> Floats:
@@ -148,31 +161,16 @@ class Factored:
         number[within] = np.arange(len(within))
         rows, columns = number[own[inner]], number[chain.target[inner]]
         entry: Floats = share[inner]
-        rank = _minimum_degree(rows, columns, self.level[within], self.work)
-        if rank is None:
-            return False
-        order = np.lexsort((rank, component[within]))
-        return self._kept(within[order], (rows, columns, entry), order, out)
+        found = ordered(rows, columns, component[within], self.work)
+        return found is not None and self._kept(within[found.order], (rows, columns, entry), found, out)
 
-    def _kept(self, nodes: Nodes, entries: tuple[Nodes, Nodes, Floats], order: Nodes, out: Floats) -> bool:
+    def _kept(self, nodes: Nodes, entries: tuple[Nodes, Nodes, Floats], found: Order, out: Floats) -> bool:
         """Factor the entries inside components, of which `nodes` are the nodes in order, and keep what comes of it."""
-        m = len(nodes)
-        place = np.empty(m, dtype=np.int64)
-        place[order] = np.arange(m)
-        rows, columns = place[entries[0]], place[entries[1]]
-        pattern = symmetric_pattern(rows, columns, m)
-        parent = compiled(elimination_tree, self.work)(*pattern)
-        most = max(MOST_FILL * m, LEAST_FILL)
-        fill = compiled(fill_of, self.work)(*pattern, parent, most)
-        if fill > most:
+        rows, columns = found.place[entries[0]], found.place[entries[1]]
+        factors = _factors(found, _compressed(rows, columns, entries[2], len(nodes)), out[nodes], self.work)
+        if factors is None:
             return False
-        look()
-        factors = compiled(eliminate, self.work)(
-            *pattern, parent, _compressed(rows, columns, entries[2], m), out[nodes], fill
-        )
-        if not (factors.kept > 0.0).all():
-            return False
-        self.rank[nodes] = np.arange(m)
+        self.rank[nodes] = np.arange(len(nodes))
         pool = self.pool
         lows, highs = int(factors.low_from[-1]), int(factors.high_from[-1])
         pool.low_from[nodes], pool.low_end[nodes] = (part + len(pool.low) for part in _edges(factors.low_from))
@@ -187,6 +185,33 @@ class Factored:
         return True
 
 
+def _factors(found: Order, near: Rows, out: Floats, work: int) -> Factors | None:
+    """Return the factors of some entries in an order, None where a row cannot be left or there is too much to do."""
+    m = len(out)
+    factors = Factors(
+        low_from=np.zeros(m + 1, dtype=np.int64),
+        low_to=np.zeros(found.fill, dtype=np.int64),
+        low=np.zeros(found.fill),
+        high_from=np.zeros(m + 1, dtype=np.int64),
+        high_to=np.zeros(found.fill, dtype=np.int64),
+        high=np.zeros(found.fill),
+        kept=np.zeros(m),
+    )
+    scratch = Scratch(np.zeros(m), _none(m), _none(m), np.zeros(m, dtype=np.int64), np.zeros(m, dtype=np.int64))
+    at, steps, kernel = np.zeros(3, dtype=np.int64), 0, compiled(eliminate_rows, work)
+    while at[0] < m:
+        look()
+        if steps > MOST_STEPS:
+            return None
+        steps += kernel(found.pattern, near, out, factors, scratch, at, SLICE)
+    return factors if (factors.kept > 0.0).all() else None
+
+
+def _none(n: int) -> Nodes:
+    """Return -1, n times."""
+    return np.full(n, -1, dtype=np.int64)
+
+
 def _edges(offsets: Nodes) -> tuple[Nodes, Nodes]:
     """Return where each row begins and ends."""
     return offsets[:-1], offsets[1:]
@@ -198,10 +223,9 @@ def _components(chain: System, work: int) -> Nodes:
     inside = np.ones(n + 2, dtype=np.bool_)
     inside[n:] = False
     component = np.full(n + 2, -1, dtype=np.int64)
-    begin = np.concatenate([np.arange(n + 1), [n, n]])
-    kernel = compiled(strong_components, work)
-    kernel(
-        begin,
+    ends = np.array([n, n])
+    compiled(strong_components, work)(
+        np.concatenate([chain.node_to_rows, ends]),
         chain.row_to_branches,
         chain.target,
         np.ones(n, dtype=np.bool_),
@@ -211,48 +235,6 @@ def _components(chain: System, work: int) -> Nodes:
         0,
     )
     return component[:n]
-
-
-def _minimum_degree(rows: Nodes, columns: Nodes, level: Nodes, work: int) -> Nodes | None:
-    """Return the rank of each variable in the elimination of a pattern, hubs last; None where factors would fill."""
-    from scipy.sparse import coo_array, eye_array
-    from scipy.sparse.linalg import splu
-
-    m = len(level)
-    degree = np.bincount(rows, minlength=m) + np.bincount(columns, minlength=m)
-    hub = degree > max(HUB, HUB * float(degree.mean()))
-    rank = np.where(hub, m, 0)
-    plain = np.flatnonzero(~hub)
-    number = np.full(m, -1)
-    number[plain] = np.arange(len(plain))
-    kept = ~hub[rows] & ~hub[columns]
-    one, other = number[rows[kept]], number[columns[kept]]
-    if not len(one):
-        return rank
-    if _fills(-level[plain], one, other, work):
-        return None
-    shape = (len(plain), len(plain))
-    matrix = 8.0 * eye_array(len(plain)) - coo_array((np.full(len(one), 0.001), (one, other)), shape=shape)
-    found = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    rank[plain] = found.perm_c
-    return rank
-
-
-def _fills(level: Nodes, rows: Nodes, columns: Nodes, work: int) -> bool:
-    """Return whether the factors of a pattern would fill by far, by the order of `level`."""
-    m = len(level)
-    place = np.empty(m, dtype=np.int64)
-    place[np.argsort(level, kind="stable")] = np.arange(m)
-    pattern = symmetric_pattern(place[rows], place[columns], m)
-    parent = compiled(elimination_tree, work)(*pattern)
-    most = max(MOST_LEVEL_FILL * m, 10_000_000)
-    return compiled(fill_of, work)(*pattern, parent, most) > most
-
-
-def symmetric_pattern(rows: Nodes, columns: Nodes, n: int) -> tuple[Nodes, Nodes]:
-    """Return the rows of the symmetric pattern with entries at (rows, columns) and (columns, rows)."""
-    made = _compressed(np.concatenate([rows, columns]), np.concatenate([columns, rows]), np.ones(2 * len(rows)), n)
-    return made.begin, made.column
 
 
 def _compressed(rows: Nodes, columns: Nodes, entries: Floats, n: int) -> Rows:
