@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
+from browsing import Seen, opened, visiting
 from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -38,6 +42,20 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"needs the published models and maps, which are not at {folder} (set RATHERTHAN_SHARED_DATA)")
     return folder
+
+
+# For a module, not for the session: while it runs, its event loop is in the way of others in the same thread.
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """The browser, a Browser of playwright's sync API; skips where there is none."""
+    with opened() as browser:
+        yield browser
+
+
+@pytest.fixture
+def visit(chromium: Any) -> Callable[..., AbstractContextManager[Seen]]:
+    """``with visit(path_or_address, width=375, scheme="dark") as seen`` opens a page: see tests/browsing.py."""
+    return partial(visiting, chromium)
 
 
 @pytest.fixture

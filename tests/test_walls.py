@@ -23,6 +23,10 @@ HOMES = {
     "lark": (lambda path: path.startswith("model/"), "model"),
     "distributed": (lambda path: path == "cluster/engine.py", "cluster/engine.py"),
     "dask": (lambda path: path == "cluster/engine.py", "cluster/engine.py"),
+    "jinja2": (
+        lambda path: path == "report/page.py" or path.startswith("apps/study/"),
+        "report/page.py and apps/study",
+    ),
     "click": (lambda path: path.startswith("apps/"), "apps"),
     "rich": (lambda path: path.startswith("apps/"), "apps"),
 }
@@ -71,6 +75,7 @@ def test_a_library_is_imported_only_in_its_room(path):
         ("io/prism.py", "def f():\n    from lark import Lark"),
         ("io/_gym_explore.py", "from gymnasium import spaces"),
         ("render/svg.py", "from rich.text import Text"),
+        ("report/figure.py", "from jinja2 import Template"),
         ("cluster/batch.py", "def f():\n    from distributed import Client"),
         ("explain/route.py", "from ratherthan.apps import cli"),
         ("explain/route.py", "from ratherthan import apps"),
@@ -87,6 +92,7 @@ def test_a_library_in_the_wrong_room_is_found(path, text):
         ("io/_storm.py", "import stormpy"),
         ("io/gymnasium.py", "def f():\n    import gymnasium"),
         ("model/reading.py", "from lark import Lark"),
+        ("report/page.py", "def f():\n    from jinja2 import Environment"),
         ("apps/cli.py", "import click\nfrom ratherthan.apps import text"),
         ("__main__.py", "from ratherthan.apps.cli import run"),
     ],

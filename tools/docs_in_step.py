@@ -1,4 +1,4 @@
-"""The code enters, docs/cli.md and docs/schema/ leave: the pages that are generated, and the check that they are in step.
+"""The code enters, docs/cli.md, docs/schema/ and the README's picture leave: what is generated, and the check that it is in step.
 
 Without arguments: compare, print what differs and exit with 1 if anything does. With ``--write``: write them anew.
 """
@@ -49,7 +49,17 @@ def schema_page() -> str:
     return json.dumps(schema(), indent=2, ensure_ascii=False) + "\n"
 
 
-PAGES = {"docs/cli.md": cli_page, "docs/schema/explanation.schema.json": schema_page}
+def town_picture() -> str:
+    import ratherthan as rt
+
+    return rt.draw(rt.explain(rt.solve(rt.read("example:paper-5x5")))).svg
+
+
+PAGES = {
+    "docs/cli.md": cli_page,
+    "docs/schema/explanation.schema.json": schema_page,
+    "docs/town.svg": town_picture,
+}
 
 
 def main() -> int:

@@ -59,6 +59,8 @@ if TYPE_CHECKING:
     from ratherthan.narrate import to_json as to_json
     from ratherthan.render import Picture as Picture
     from ratherthan.render import draw as draw
+    from ratherthan.report import Report as Report
+    from ratherthan.report import report as report
     from ratherthan.solve import Outcome as Outcome
     from ratherthan.solve import Solution as Solution
     from ratherthan.solve import evaluate as evaluate
@@ -97,6 +99,7 @@ __all__ = [  # noqa: RUF022 - sorted as `sorted` does, which a test holds
     "QuestionError",
     "RatherthanError",
     "ReachAvoid",
+    "Report",
     "Reward",
     "Solution",
     "SourceError",
@@ -115,6 +118,7 @@ __all__ = [  # noqa: RUF022 - sorted as `sorted` does, which a test holds
     "parse_property",
     "read",
     "read_policy",
+    "report",
     "solve",
     "to_json",
     "tradeoffs",
@@ -147,6 +151,7 @@ _ROOMS = {
     "model.world": ["World"],
     "narrate": ["from_json", "narrate", "to_json"],
     "render": ["Picture", "draw"],
+    "report": ["Report", "report"],
     "solve": ["Outcome", "Solution", "evaluate", "solve"],
     "solve.pareto": ["Tradeoffs", "tradeoffs"],
     "verify": ["Verdicts", "verify"],
@@ -163,6 +168,30 @@ class _Window(types.ModuleType):
 
 
 sys.modules[__name__].__class__ = _Window
+
+_SHOWN = {
+    "explain.explanation": "Explanation",
+    "model.mdp": "MDP",
+    "model.problem": "Problem",
+    "solve.solution": "Solution",
+}
+
+
+def _show_in_notebooks() -> None:
+    """Let IPython, where we are in it, show models, solutions and explanations; by name, so that nothing is loaded yet."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    formatter = getattr(shell, "display_formatter", None)
+    if formatter is not None:
+        for room, name in _SHOWN.items():
+            formatter.formatters["text/html"].for_type_by_name(f"{__name__}.{room}", name, _shown)
+
+
+def _shown(thing: object) -> str:
+    found: str = importlib.import_module(f"{__name__}.report.notebook").shown(thing)
+    return found
+
+
+_show_in_notebooks()
 
 if not TYPE_CHECKING:  # to a type checker the names above are all there is
 

@@ -147,7 +147,7 @@ def test_a_model_that_the_memory_limit_does_not_hold_is_told_in_a_sentence(proce
     path = tmp_path / "large.npz"
     write(slippery_map(400), path)
     done = process("explain", path, "--memory-limit", "110MB", "-o", tmp_path / "route.txt")
-    assert done.returncode == 1, done.stderr
+    assert done.returncode == 2, done.stderr
     assert b"Traceback" not in done.stderr
     assert done.stderr.startswith(b"ratherthan: ")
     assert b"the limit of 110 MB leaves" in done.stderr or b"The memory limit of 110 MB was reached" in done.stderr

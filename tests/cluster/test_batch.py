@@ -12,6 +12,7 @@ import pytest
 import ratherthan as rt
 from ratherthan.cluster import answering, explain_many
 from ratherthan.errors import MissingExtraError, SourceError
+from ratherthan.model.watch import Limits
 
 ROWS = [
     {"id": "route", "source": "example:paper-5x5", "tag_team": "red"},
@@ -53,6 +54,58 @@ def without_times(path):
     """Return the rows of a table of results without how long they took."""
     with Path(path).open(newline="", encoding="utf-8") as file:
         return [{key: cell for key, cell in row.items() if key != "seconds"} for row in csv.DictReader(file)]
+
+
+MAP = """type octile
+height 3
+width 9
+map
+.........
+.@@@@@@@.
+.........
+"""
+
+
+def test_rows_drive_on_maps_as_explain_does(table, tmp_path):
+    (tmp_path / "yard.map").write_text(MAP, encoding="ascii")
+    rows = [
+        {
+            "id": "far",
+            "source": "yard.map",
+            "start": "0,1",
+            "goal": "8,1",
+            "slip": "0",
+            "at_most": "1",
+            "rank": "place",
+        },
+        {"id": "near", "source": "yard.map", "start": "7,0", "goal": "8,1", "slip": "0"},
+        {"id": "four", "source": "yard.map", "start": "7,0", "goal": "8,1", "slip": "0", "directions": "4"},
+        {"id": "no map", "source": "example:paper-5x5", "goal": "8,1"},
+    ]
+    found = explain_many(table(rows), workers=1)
+    far, near, four, stranger = found.rows
+    problem = rt.read("yard.map", start="0,1", goal="8,1", slip=0.0)
+    asked = rt.explain(rt.solve(problem), at_most=1, ranking="place")
+    assert far["text"] == rt.narrate(asked)
+    assert far["value"] == pytest.approx(10.0)
+    assert near["value"] == pytest.approx(2.0)  # no corner is cut
+    assert four["value"] == pytest.approx(2.0)
+    assert stranger["status"] == "failed"
+    assert "Only a map of cells" in stranger["error"]
+
+
+def test_a_row_that_reaches_a_limit_fails_alone(table, monkeypatch):
+    rows = [
+        {"id": "quick", "source": "example:paper-5x5"},
+        {"id": "fine", "source": "example:paper-5x5", "precision": 2},
+    ]
+    limited = explain_many(table(rows), workers=1, limits=Limits(seconds=1e-6))
+    assert [row["status"] for row in limited.rows] == ["failed", "failed"]
+    assert "time limit" in limited.rows[0]["error"]
+    assert limited.faults >= 1
+    free = explain_many(table(rows), workers=1, limits=Limits(seconds=3600.0))
+    assert [row["status"] for row in free.rows] == ["answered", "failed"]
+    assert "precision must lie between 0 and 1" in free.rows[1]["error"]
 
 
 def test_a_row_says_what_the_package_says(table, tmp_path):

@@ -20,9 +20,11 @@ if TYPE_CHECKING:
     from ratherthan.model.problem import Problem
     from ratherthan.solve import Solution
 
-__all__ = ["answer_of", "explanation_of", "factor_table_of", "problem_of"]
+__all__ = ["answer_of", "explanation_of", "factor_table_of", "problem_of", "solution_of"]
 
 MILLION = 1_000_000
+FEW, MANY = 7, 12
+"""How many sentences about steps pages and pictures have where there would be more than so many."""
 
 
 def problem_of(wanted: Wanted) -> Problem:
@@ -88,12 +90,15 @@ def answer_of(
     return storm_document(answer, problem), answer.text
 
 
-def explanation_of(wanted: Wanted, given: Mapping[str, Any]) -> Explanation:
-    """Return the explanation that the options of ``ratherthan explain`` ask for."""
+def explanation_of(wanted: Wanted, given: Mapping[str, Any], *, usable: bool = False) -> Explanation:
+    """Return the explanation that the options of ``ratherthan explain`` ask for; in few sentences where it is to be `usable`."""
     from ratherthan.apps.limits import with_value
     from ratherthan.explain import explain
+    from ratherthan.explain.telling import matters
     from ratherthan.model.states import start_of, state_number
 
+    if usable and given.get("ranking") is not None and given.get("at_most") is None:
+        given = {**given, "at_most": FEW}
     problem, also = _explainable(wanted, given["also"])
     state = given["state"]
     if state is None:
@@ -101,7 +106,20 @@ def explanation_of(wanted: Wanted, given: Mapping[str, Any]) -> Explanation:
     asked = _question(given, None if state is None else state_number(problem.mdp, state))
     solution = _solved(problem, given["policy"], minimise_q=given["minimise_q"])
     with waiting("Explaining"), with_value(solution):
+        if usable and asked.at_most is None and asked.scope == "route":
+            few = explain(solution, asked=replace(asked, at_most=FEW), also=also)
+            if sum(matters(step, asked) for step in few.steps) > MANY:
+                return few
         return explain(solution, asked=asked, also=also)
+
+
+def solution_of(wanted: Wanted, policy: str | None, *, minimise_q: bool) -> Solution:
+    """Return the plan that is wanted, the best one or the one of a file, with its values."""
+    from ratherthan.model.states import start_of
+
+    problem, _ = _explainable(wanted)
+    start_of(problem.mdp)
+    return _solved(problem, policy, minimise_q=minimise_q)
 
 
 def factor_table_of(wanted: Wanted, given: Mapping[str, Any]) -> dict[str, Column]:
@@ -220,6 +238,8 @@ def _question(given: Mapping[str, Any], state: int | None) -> Question:
         policy_values=given["values"] == "policy",
         search=Search(horizon=given["horizon"], toward_goal=given["toward"] == "goal"),
         detail=given.get("detail", False),
+        at_most=given.get("at_most"),
+        ranking=given.get("ranking"),
     )
 
 

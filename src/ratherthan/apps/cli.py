@@ -10,13 +10,14 @@ import click
 
 from ratherthan.apps.door import Door, say, silence
 from ratherthan.apps.guard import stand_guard
-from ratherthan.apps.options import Command
 from ratherthan.model.compiling import tally
 
-__all__ = ["COMMANDS", "Ratherthan", "main", "run"]
+__all__ = ["COMMANDS", "GROUPS", "Ratherthan", "main", "run"]
 
 COMMANDS = (
     "explain",
+    "report",
+    "draw",
     "factors",
     "solve",
     "tradeoffs",
@@ -28,6 +29,8 @@ COMMANDS = (
     "warmup",
     "completion",
 )
+GROUPS = ("study",)
+"""Commands that have commands of their own."""
 
 
 class Ratherthan(Door):
@@ -35,13 +38,13 @@ class Ratherthan(Door):
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Return the names of the commands, in the order in which help lists them."""
-        return list(COMMANDS)
+        return [*COMMANDS, *GROUPS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - click's
         """Return one command, None where there is none of that name."""
-        if cmd_name not in COMMANDS:
+        if cmd_name not in (*COMMANDS, *GROUPS):
             return None
-        command: Command = importlib.import_module(f"ratherthan.apps.commands.{cmd_name}").command
+        command: click.Command = importlib.import_module(f"ratherthan.apps.commands.{cmd_name}").command
         return command
 
 

@@ -4,8 +4,8 @@
 code
 ==== ===================================================================
 0    an answer, also "there is no way"; a reader who left early
-2    bad input: a file, model, property, question or option
-1    a fault of the program, or a limit of time or memory that was reached before there was an answer
+2    bad input: a file, model, property, question or option; a model that the memory does not hold
+1    a fault of the program, or a time limit that was reached before there was an answer
 130  interrupted; 143 ended by another process
 ==== ===================================================================
 """
@@ -16,13 +16,16 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from ratherthan.apps import guard
 
-__all__ = ["Door", "one_line", "say", "silence"]
+if TYPE_CHECKING:
+    from ratherthan.errors import RatherthanError
+
+__all__ = ["Door", "code_of", "one_line", "say", "silence"]
 
 MOST_SAID = 2000
 """No message is longer: what came may have been a whole file."""
@@ -70,7 +73,7 @@ def _interrupted(interrupt: BaseException) -> int:
 
 def _refused(error: Exception) -> int:
     """Say what went wrong and return the exit code."""
-    from ratherthan.errors import InputError, RatherthanError
+    from ratherthan.errors import RatherthanError
 
     debugging = os.environ.get("RATHERTHAN_DEBUG", "0") not in ("", "0")
     if debugging and not isinstance(error, click.ClickException):
@@ -82,7 +85,7 @@ def _refused(error: Exception) -> int:
         return 2
     if isinstance(error, RatherthanError):
         say(error.message)
-        return 2 if isinstance(error, InputError) else 1
+        return code_of(error)
     if isinstance(error, MemoryError):
         say("The memory of this machine must hold the model, but it does not suffice. Take a smaller model.")
         return 2
@@ -96,6 +99,14 @@ def _refused(error: Exception) -> int:
         + hint
     )
     return 1
+
+
+def code_of(error: RatherthanError) -> int:
+    """Return the exit code of an error: 2 for what is given, and for a model that the memory does not hold; else 1."""
+    from ratherthan.errors import InputError, LimitError
+
+    too_large = isinstance(error, LimitError) and error.place.get("limit") == "memory"
+    return 2 if too_large or isinstance(error, InputError) else 1
 
 
 def _usage(error: click.ClickException) -> str:

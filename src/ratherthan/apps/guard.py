@@ -93,7 +93,8 @@ class Guard:
         """Begin to listen."""
         signal.set_wakeup_fd(self.mouth.fileno(), warn_on_full_buffer=False)
         for number in _heard():
-            signal.signal(number, self.on_signal)
+            if number != getattr(signal, "SIGHUP", None) or signal.getsignal(number) != signal.SIG_IGN:  # nohup
+                signal.signal(number, self.on_signal)
         sys.unraisablehook = self.on_unraisable
         threading.Thread(target=self.listen, name="guard", daemon=True).start()
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ratherthan.apps.door import say
+from ratherthan.apps.door import code_of, say
 from ratherthan.errors import LimitError, StoppedError
 from ratherthan.model.memory import memory_held, size_text
 from ratherthan.model.watch import Limits, Watch, watching
@@ -103,7 +103,7 @@ def limited(seconds: float | None, memory: int | None) -> Iterator[Watch]:
 def _said(error: StoppedError) -> int:
     """Say what is known, and return the exit code."""
     say(error.message)
-    return 1
+    return code_of(error)
 
 
 @contextmanager
@@ -123,7 +123,7 @@ def speaking(tell: Callable[[StoppedError], None]) -> Iterator[None]:
 
     def answer(error: StoppedError) -> int:
         tell(error)
-        return 1
+        return code_of(error)
 
     before, guard.answer = guard.answer, _known(answer)
     try:
@@ -142,7 +142,7 @@ def _known(answer: Callable[[StoppedError], int]) -> Callable[[LimitError], int]
         kept = {} if watch is None else watch.board.kept
         if "problem" not in kept:
             say(limit.message)
-            return 1
+            return code_of(limit)
         from ratherthan.solve.stopped import unsolved
 
         return answer(unsolved(limit, kept))

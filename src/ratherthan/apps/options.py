@@ -11,7 +11,17 @@ import click
 
 from ratherthan.apps.driving import driving_options
 
-__all__ = ["Command", "Option", "Wanted", "argument", "measure_options", "option", "output_options", "source_options"]
+__all__ = [
+    "Command",
+    "Option",
+    "Wanted",
+    "argument",
+    "file_option",
+    "measure_options",
+    "option",
+    "output_options",
+    "source_options",
+]
 
 SECTIONS = ("Arguments", "Question", "Policy", "Source", "Maps (.map, .yaml)", "Output", "Limits", "Other")
 F = TypeVar("F", bound=Callable[..., Any])
@@ -252,6 +262,17 @@ _MEASURES: tuple[Callable[[F], F], ...] = (
     ),
     option("--minimise-q", section="Policy", is_flag=True, help="In a Q table the smallest number is taken."),
 )
+
+
+def file_option(suffix: str) -> Callable[[F], F]:
+    """Decorate a command with ``--output`` where there is one format only."""
+    return option(
+        "-o",
+        "--output",
+        section="Output",
+        metavar=f"FILE{suffix}",
+        help="Write the answer to a file, whole or not at all.  [default: standard output]",
+    )
 
 
 def output_options(*formats: str) -> Callable[[F], F]:

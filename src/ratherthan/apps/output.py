@@ -13,7 +13,7 @@ import click
 from ratherthan.apps.door import one_line, silence
 from ratherthan.errors import QuestionError, SourceError
 
-__all__ = ["as_json", "check_binary", "form_of", "on_terminal", "send", "send_line", "send_lines"]
+__all__ = ["as_json", "check_binary", "check_suffix", "form_of", "on_terminal", "send", "send_line", "send_lines"]
 
 
 def form_of(form: str | None, output: str | None, forms: tuple[str, ...]) -> str:
@@ -24,10 +24,25 @@ def form_of(form: str | None, output: str | None, forms: tuple[str, ...]) -> str
     return suffix if suffix in forms else forms[0]
 
 
-def check_binary(output: str | None) -> None:
-    """Raise QuestionError where bytes would be written to a terminal."""
+def check_binary(output: str | None, what: str = "Parquet") -> None:
+    """Raise QuestionError where what nobody reads as it is would be written to a terminal."""
     if output in (None, "-") and on_terminal():
-        raise QuestionError("Parquet must go to a file or a pipe, not to a terminal. Give --output FILE.")
+        raise QuestionError(f"{what} must go to a file or a pipe, not to a terminal. Give --output FILE.")
+
+
+def check_suffix(output: str | None, suffixes: tuple[str, ...]) -> None:
+    """Raise SourceError where a file is to be written whose suffix says that it is something else."""
+    if output not in (None, "-") and Path(str(output)).suffix.lower() not in suffixes and not _is_device(str(output)):
+        raise SourceError(
+            f"The file to be written must end in {' or '.join(suffixes)}, got '{output}'. Give it that suffix.",
+            path=output,
+        )
+
+
+def _is_device(output: str) -> bool:
+    """Whether something is there that is neither a file nor a folder: /dev/null, a pipe."""
+    path = Path(output)
+    return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def on_terminal() -> bool:
@@ -86,7 +101,7 @@ def send(parts: Iterable[str | bytes | bytearray], output: str | None = None) ->
     chunks = (part.encode("utf-8", "backslashreplace") if isinstance(part, str) else part for part in parts)
     if output is None or output == "-":
         _to_standard_output(chunks)
-    elif Path(output).exists() and not Path(output).is_file() and not Path(output).is_dir():
+    elif _is_device(output):
         _to_device(output, chunks)
     else:
         from ratherthan.io._files import write_atomically

@@ -141,6 +141,7 @@ def _explained(problem: Problem, objective: Objective | Threshold | None = None)
         narrate(explanation)
         to_json(explanation)
         explain(solution, kind="constrictive")
+        explain(solution, kind="naive-path", at_most=1)
         factors = Factors(solution=solution, asked=question("contrastive"))
         for _ in factor_columns(factors, None).values():
             pass

@@ -13,8 +13,9 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ratherthan.cluster.missions import Mission, model_of, questioned
+from ratherthan.cluster.missions import Mission, driven, model_of, questioned, read_from
 from ratherthan.errors import LimitError, PropertyError, RatherthanError
+from ratherthan.model.watch import Limits, watching
 
 if TYPE_CHECKING:
     from ratherthan.explain import Explanation
@@ -39,15 +40,15 @@ class _Opened:
 _opened: OrderedDict[tuple[Any, ...], _Opened] = OrderedDict()
 
 
-def answer_some(missions: Sequence[Mission], folder: str, *, documents: bool) -> list[dict[str, Any]]:
+def answer_some(missions: Sequence[Mission], folder: str, *, documents: bool, limits: Limits) -> list[dict[str, Any]]:
     """Return a row of results for each of some missions, as `answers` yields them; relative paths begin in `folder`."""
     with suppress(OSError):
         if os.getcwd() != folder:  # noqa: PTH109 - compared as text
             os.chdir(folder)
-    return list(answers(missions, documents=documents))
+    return list(answers(missions, documents=documents, limits=limits))
 
 
-def answers(missions: Sequence[Mission], *, documents: bool) -> Iterator[dict[str, Any]]:
+def answers(missions: Sequence[Mission], *, documents: bool, limits: Limits) -> Iterator[dict[str, Any]]:
     """Yield a row of results for each of some missions; what is wrong with one is a result, too.
 
     Parameters
@@ -55,7 +56,11 @@ def answers(missions: Sequence[Mission], *, documents: bool) -> Iterator[dict[st
     missions : sequence of Mission
     documents : bool
         Whether each explanation is wanted as a document, too.
+    limits : Limits
+        How much each of them may take.
     """
+    from ratherthan.solve.precise import aiming
+
     for mission in missions:
         begun = time.perf_counter()
         row: dict[str, Any] = dict.fromkeys(
@@ -63,7 +68,8 @@ def answers(missions: Sequence[Mission], *, documents: bool) -> Iterator[dict[st
         )
         row |= {"row": mission.number, "status": "answered", "error": None, "fault": False}
         try:
-            row |= _answered(mission, documents=documents)
+            with watching(limits), aiming(mission.precision):
+                row |= _answered(mission, documents=documents)
         except (MemoryError, OSError, RatherthanError) as error:
             row |= {"status": "failed", "error": _sentence(error), "fault": isinstance(error, LimitError)}
         except Exception as error:  # noqa: BLE001 - one row's fault is told in that row, and the others go on
@@ -94,7 +100,7 @@ def _answered(mission: Mission, *, documents: bool) -> dict[str, Any]:
     solution = _solution_of(mission)
     problem = solution.problem
     state = None
-    for given in (mission.state, mission.start):
+    for given in (mission.state, None if driven(mission) else mission.start):
         if given is not None and state is None:
             state = state_number(problem.mdp, given)
     place = start_of(problem.mdp) if state is None else state
@@ -146,8 +152,13 @@ def _solved(mission: Mission) -> Solution:
     from ratherthan.model.property import lexicographic, wish_of
     from ratherthan.solve import evaluate, solve
 
-    start = None if mission.policy is None else mission.start
-    problem = read(mission.source, constants=mission.constants, start=start, properties=mission.property)
+    problem = read(
+        mission.source,
+        constants=mission.constants,
+        start=read_from(mission),
+        properties=mission.property,
+        **driven(mission),
+    )
     wishes = [wish_of(problem, text, discount=mission.discount) for text in mission.property or (None,)]
     wish = wishes[0] if len(wishes) == 1 else lexicographic(wishes)
     if isinstance(wish, Threshold):

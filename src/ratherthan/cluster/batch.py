@@ -21,7 +21,7 @@ from ratherthan.cluster.missions import Mission, missions_of, model_of
 from ratherthan.cluster.tables import form_of, need, read_rows, write_rows
 from ratherthan.errors import SourceError
 from ratherthan.io._files import write_atomically
-from ratherthan.model.watch import look
+from ratherthan.model.watch import Limits, look
 
 __all__ = ["RESULTS", "Explained", "explain_many"]
 
@@ -70,6 +70,14 @@ class Explained:
     faults: int
 
 
+@dataclass(frozen=True, kw_only=True)
+class _How:
+    """What holds for all rows."""
+
+    documents: bool
+    limits: Limits
+
+
 @dataclass(eq=False)
 class _Part:
     """Rows of one group that one worker answers, one piece after the other."""
@@ -89,6 +97,7 @@ def explain_many(
     cluster: str | None = None,
     resume: bool = False,
     documents: str | os.PathLike[str] | None = None,
+    limits: Limits | None = None,
     tell: Callable[[str], None] | None = None,
     note: Callable[[str], None] | None = None,
 ) -> Explained:
@@ -108,6 +117,8 @@ def explain_many(
         Go on with what an interrupted run left beside `output`.
     documents : path, optional
         A folder that gets every explanation as a document, ``000001.json`` and so on.
+    limits : Limits, optional
+        How much each row may take: the time that its answer takes, and the memory of the process that answers it.
     tell, note : callable, optional
         Take a short text: how far it is; and a sentence that a person should read.
 
@@ -138,7 +149,8 @@ def explain_many(
         if resume and journal is not None:
             note(f"{len(done)} of {len(read)} missions are done already.")
         left = [mission for mission in read if mission.number not in done]
-        for row in _computed(_parts(left, workers, cluster), documents is not None, workers, cluster, note):
+        how = _How(documents=documents is not None, limits=limits or Limits())
+        for row in _computed(_parts(left, workers, cluster), how, workers, cluster, note):
             _keep_document(row, documents)
             if journal is not None:
                 journal.add(_stored(row))
@@ -210,7 +222,7 @@ def _parts(missions: Sequence[Mission], workers: int | None, cluster: str | None
 
 
 def _computed(
-    parts: list[_Part], documents: bool, workers: int | None, cluster: str | None, note: Callable[[str], None]
+    parts: list[_Part], how: _How, workers: int | None, cluster: str | None, note: Callable[[str], None]
 ) -> Iterator[dict[str, Any]]:
     """Yield the row of every mission as soon as it is there."""
     if not parts:
@@ -226,12 +238,12 @@ def _computed(
             count = 1
     if cluster is None and count == 1:
         for part in parts:
-            yield from answers(part.missions, documents=documents)
+            yield from answers(part.missions, documents=how.documents, limits=how.limits)
         return
-    yield from _spread(parts, documents, count, cluster)
+    yield from _spread(parts, how, count, cluster)
 
 
-def _spread(parts: list[_Part], documents: bool, workers: int, cluster: str | None) -> Iterator[dict[str, Any]]:
+def _spread(parts: list[_Part], how: _How, workers: int, cluster: str | None) -> Iterator[dict[str, Any]]:
     """Yield the rows that workers answer: each has one part at a time, and gets its rows in small pieces."""
     from ratherthan.cluster.engine import WorkerLostError, engine
 
@@ -241,7 +253,7 @@ def _spread(parts: list[_Part], documents: bool, workers: int, cluster: str | No
 
         def begin(part: _Part) -> None:
             part.given, part.since = part.missions[: part.size], time.monotonic()
-            running[pool.submit(_answered_here, part.given, folder, documents, at=part.at)] = part
+            running[pool.submit(_answered_here, part.given, folder, how, at=part.at)] = part
 
         def fill() -> None:
             there = pool.workers()
@@ -272,11 +284,11 @@ def _spread(parts: list[_Part], documents: bool, workers: int, cluster: str | No
             fill()
 
 
-def _answered_here(missions: list[Mission], folder: str, documents: bool) -> tuple[str, list[dict[str, Any]]]:
+def _answered_here(missions: list[Mission], folder: str, how: _How) -> tuple[str, list[dict[str, Any]]]:
     """Answer some missions on a worker; return which one that is, too."""
     from ratherthan.cluster.engine import here
 
-    return here(), answer_some(missions, folder, documents=documents)
+    return here(), answer_some(missions, folder, documents=how.documents, limits=how.limits)
 
 
 def _lost(mission: Mission, error: Exception) -> dict[str, Any]:

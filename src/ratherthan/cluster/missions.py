@@ -15,8 +15,10 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from ratherthan.errors import QuestionError, SourceError
+from ratherthan.explain.question import RANKINGS
+from ratherthan.io.grids.drive import KEYS
 
-__all__ = ["COLUMNS", "Mission", "missions_of", "model_of", "questioned"]
+__all__ = ["COLUMNS", "Mission", "driven", "missions_of", "model_of", "questioned", "read_from"]
 
 TRUE, FALSE = ("true", "yes", "1"), ("false", "no", "0")
 CARRIED = "tag"
@@ -63,12 +65,38 @@ class Mission:
     values: str = "optimum"
     horizon: int | None = None
     toward: str | None = None
+    at_most: int | None = None
+    rank: str | None = None
+    precision: float | None = None
+    goal: str | None = None
+    scen: str | None = None
+    row: int | None = None
+    slip: float | None = None
+    stay: float | None = None
+    directions: str | None = None
+    radius: float | None = None
+    cell: float | None = None
+    speed: str | None = None
+    safe: float | None = None
+    zones: str | None = None
+    unknown: str | None = None
+
+
+def driven(mission: Mission) -> dict[str, Any]:
+    """Return how a robot drives on a map of cells, as `ratherthan.read` takes it: what is given of it."""
+    return {key: value for key in KEYS if (value := getattr(mission, key)) is not None}
+
+
+def read_from(mission: Mission) -> str | None:
+    """Return the start where a model must be read with it; elsewhere it is one state of the model like others.
+
+    A policy is judged from where it starts: it need not say anything of what it does not reach. On a map a start is a place.
+    """
+    return mission.start if mission.policy is not None or driven(mission) else None
 
 
 def model_of(mission: Mission) -> tuple[Any, ...]:
     """Return what missions must have in common to share one reading and one solving."""
-    # A policy is judged from where it starts: it need not say anything of what it does not reach.
-    start = None if mission.policy is None else mission.start
     return (
         mission.source,
         mission.property,
@@ -76,7 +104,9 @@ def model_of(mission: Mission) -> tuple[Any, ...]:
         mission.constants,
         mission.policy,
         mission.minimise_q,
-        start,
+        read_from(mission),
+        mission.precision,
+        tuple(driven(mission).items()),
     )
 
 
@@ -240,6 +270,17 @@ _KINDS: Mapping[str, Callable[[object], Any]] = {
     "discount": _number,
     "alpha": _number,
     "horizon": _whole,
+    "at_most": _whole,
+    "rank": _one_of(*RANKINGS),
+    "precision": _number,
+    "row": _whole,
+    "slip": _number,
+    "stay": _number,
+    "directions": _one_of("4", "8"),
+    "radius": _number,
+    "cell": _number,
+    "safe": _number,
+    "unknown": _one_of("free", "closed"),
     "minimise_q": _truth,
     "detail": _truth,
     "impact": _one_of("action-value", "omega"),
@@ -275,4 +316,6 @@ def questioned(mission: Mission, state: int | None) -> dict[str, Any]:
         "policy_values": mission.values == "policy",
         "search": Search(horizon=mission.horizon, toward_goal=mission.toward == "goal"),
         "detail": mission.detail,
+        "at_most": mission.at_most,
+        "ranking": mission.rank,
     }

@@ -11,7 +11,8 @@ import numpy as np
 
 from ratherthan.errors import PolicyError, QuestionError
 from ratherthan.explain.claims import flexibility, flexibility_against
-from ratherthan.explain.explanation import Alternative, Claim, Closing, Explanation, Step, Trade
+from ratherthan.explain.explanation import Alternative, Claim, Closing, Explanation, Measured, Step, Trade
+from ratherthan.explain.few import left_out, selected
 from ratherthan.explain.further import View, further_objectives, views_of
 from ratherthan.explain.levels import Judges
 from ratherthan.explain.measures import Factors
@@ -159,6 +160,8 @@ class _Explainer:
     def _of_route(self, start: int) -> Explanation:
         route = route_from(self.solution, self.graph, start)
         steps = self._steps(route)
+        if self.asked.at_most is not None:
+            steps = selected(self.factors, route, steps)
         return self._record(
             start,
             route=route.states,
@@ -231,6 +234,7 @@ class _Explainer:
             trades=self._trades(state, choice, others) if told else (),
             foil=None if foil is None else mdp.action_name(foil),
             alternatives=self._alternatives(others) if foil is not None or (told and critical is not False) else (),
+            numbers=self._numbers(state, choice, others) if told and self.asked.detail else (),
         )
 
     def _alternatives(self, others: Sequence[int]) -> tuple[Alternative, ...]:
@@ -242,6 +246,15 @@ class _Explainer:
             towards = int(mdp.branch_to_target[branches][likeliest])
             found.append(Alternative(action=mdp.action_name(other), towards=towards))
         return tuple(found)
+
+    def _numbers(self, state: int, choice: int, others: Sequence[int]) -> tuple[tuple[Measured, ...], ...]:
+        """Return what the choice taken and others come to at each level that has not ended there."""
+        if self.solution.ended[state]:
+            return ()
+        running = [
+            judge for judge in self.judges.levels if judge.level == 0 or not self.factors.ended[judge.level][state]
+        ]
+        return tuple(tuple(judge.measured(one) for one in (choice, *others)) for judge in running)
 
     def _claims(self, state: int, choice: int, foil: int | None) -> list[Claim]:
         """Return the claims of one step."""
@@ -302,6 +315,7 @@ class _Explainer:
             largest_difference=largest,
             off_route=certain,
             off_route_open=int((self.factors.critical.possible & reachable).sum()) - certain,
+            left_out=left_out(self.judges, steps),
         )
 
     def _largest_difference(self, untold: list[int]) -> float | None:

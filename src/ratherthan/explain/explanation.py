@@ -25,11 +25,13 @@ __all__ = [
     "Explanation",
     "Further",
     "Judged",
+    "LeftOut",
     "Measured",
     "ObjectiveRecord",
     "Opening",
     "PolicyRecord",
     "PolicyRows",
+    "Rank",
     "StateRecord",
     "Step",
     "Tally",
@@ -47,6 +49,26 @@ class Alternative:
 
     action: str
     towards: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rank:
+    """What a step was ranked by, where not all could be told (see `ratherthan.explain.ranking`).
+
+    Parameters
+    ----------
+    level : int
+        The level of the objective that it is about: the first that differs, else the last.
+    size : float
+        How much worse the best alternative is, without turning back; or what else the ranking is by. Negative where it is
+        better, ∞ where it does not arrive.
+    settled : bool
+        False where the search ended early: then it is a lower bound.
+    """
+
+    level: int
+    size: float
+    settled: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +98,10 @@ class Step:
         False where it matters and yet no sentence tells it, as there are to be few.
     alternatives : tuple of Alternative
         What else could have been done: the foil, or for a told step that is critical each other action.
+    rank : Rank, optional
+        Where not all steps could be told.
+    numbers : tuple of tuple of Measured
+        Where details were asked for: for each level that matters here the choice taken and each alternative.
     """
 
     state: int
@@ -91,6 +117,8 @@ class Step:
     trades: tuple[Trade, ...] = ()
     told: bool = True
     alternatives: tuple[Alternative, ...] = ()
+    rank: Rank | None = None
+    numbers: tuple[tuple[Measured, ...], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,6 +128,25 @@ class StateRecord:
     name: str
     named: bool
     place: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeftOut:
+    """The steps that matter and are not told, as there are to be few sentences.
+
+    Parameters
+    ----------
+    steps : int
+        How many there are.
+    unsure : int
+        At how many of them some action, though not every one, is infinitely bad at the first level: it is not sure to arrive.
+    largest : tuple of float or None
+        For each level the largest difference that one of the others makes, at most; None where that is open or has no end.
+    """
+
+    steps: int
+    unsure: int = 0
+    largest: tuple[float | None, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,12 +164,15 @@ class Closing:
         How many critical states can be reached under the policy, off the route.
     off_route_open : int
         How many more are open.
+    left_out : LeftOut, optional
+        What matters and is not told either.
     """
 
     printed: bool = False
     largest_difference: float | None = None
     off_route: int = 0
     off_route_open: int = 0
+    left_out: LeftOut | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -81,6 +81,6 @@ class Judges:
         own = self.factors.solution.problem.mdp.choices_of(state)
         return spread_of(self.factors.measures, own, omega=self.factors.asked.omega)
 
-    def difference(self, state: int) -> tuple[Interval, Interval]:
-        """Return the largest and the smallest q of a state at the first level."""
-        return spread_of(self.factors.measures, self.factors.solution.problem.mdp.choices_of(state))
+    def difference(self, state: int, level: int = 0) -> tuple[Interval, Interval]:
+        """Return the largest and the smallest q of a state at a level."""
+        return spread_of(self.factors.levels[level], self.factors.solution.problem.mdp.choices_of(state))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from ratherthan.errors import QuestionError
 from ratherthan.factors import TOLERANCE, Search
 
-__all__ = ["FACTORS", "KINDS", "Question", "question"]
+__all__ = ["FACTORS", "KINDS", "RANKINGS", "Question", "question"]
 
 FACTORS = ("selectiveness", "constrictiveness", "responsibility")
 
@@ -23,6 +23,9 @@ KINDS: dict[str, tuple[str, frozenset[str]]] = {
     "contrastive": ("route", frozenset(FACTORS)),
 }
 """The seven kinds of the paper as combinations of scope and factors."""
+
+RANKINGS = ("detour", "spread", "expected", "place")
+"""By what the decisions are chosen that are told where not all are: see `ratherthan.explain.ranking`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +56,10 @@ class Question:
         The factor of τ in comparisons.
     detail : bool
         Say also what the alternatives would lead to.
+    at_most : int, optional
+        How many sentences about steps there may be; steps alike in a row are then told in one. None tells every step alone.
+    ranking : str
+        One of `RANKINGS`: which steps are told where there are more.
     """
 
     kind: str
@@ -66,6 +73,8 @@ class Question:
     search: Search = field(default_factory=Search)
     tolerance: float = TOLERANCE
     detail: bool = False
+    at_most: int | None = None
+    ranking: str = "detour"
 
 
 def question(
@@ -80,6 +89,8 @@ def question(
     policy_values: bool = False,
     search: Search | None = None,
     detail: bool = False,
+    at_most: int | None = None,
+    ranking: str | None = None,
 ) -> Question:
     """Build a Question from a kind, or from scope and factors.
 
@@ -89,13 +100,14 @@ def question(
         One of `KINDS`; "contrastive" if nothing else is said.
     scope, factors : optional
         Another combination: scope "state" or "route", any of `FACTORS`.
-    state, rather_than, alpha, omega, policy_values, search, detail
+    state, rather_than, alpha, omega, policy_values, search, detail, at_most, ranking
         As in `Question`.
 
     Raises
     ------
     QuestionError
-        For an unknown kind, scope or factor, a contradiction, or a threshold that is no number from 0 on.
+        For an unknown kind, scope, factor or ranking, a contradiction, a threshold that is no number from 0 on, or a number of
+        sentences that is none from 1 on.
     """
     if not (isinstance(alpha, int | float) and math.isfinite(alpha) and alpha >= 0):
         raise QuestionError(f"The threshold alpha must be a number from 0 on, got {alpha!r}.", alpha=alpha)
@@ -118,6 +130,7 @@ def question(
         if kind not in KINDS:
             raise QuestionError(f"The kind must be one of {', '.join(KINDS)}; got '{kind}'.", kind=kind)
         scope, chosen = KINDS[kind]
+    _check_few(at_most, ranking, scope, kind)
     return Question(
         kind=kind,
         scope=scope,
@@ -129,7 +142,28 @@ def question(
         policy_values=policy_values,
         search=search or Search(),
         detail=detail,
+        at_most=at_most,
+        ranking=ranking or "detour",
     )
+
+
+def _check_few(at_most: int | None, ranking: str | None, scope: str, kind: str) -> None:
+    """Raise where it makes no sense how many sentences there may be, or which come first."""
+    if ranking is not None and ranking not in RANKINGS:
+        raise QuestionError(f"The ranking must be one of {', '.join(RANKINGS)}; got {ranking!r}.", ranking=ranking)
+    if at_most is None:
+        if ranking is not None:
+            raise QuestionError(
+                "A ranking must come with a number of sentences that there may be: give --at-most N, too (at_most=N in Python)."
+            )
+        return
+    if isinstance(at_most, bool) or not isinstance(at_most, int) or at_most < 1:
+        raise QuestionError(f"There may be at most N sentences, N a whole number from 1 on; got {at_most!r}.")
+    if scope != "route":
+        raise QuestionError(
+            f"A number of sentences (--at-most) must be for a route, which has many steps; kind '{kind}' is not about one. "
+            "Ask for naive-path, selective or contrastive."
+        )
 
 
 def _checked(factors: Iterable[str]) -> frozenset[str]:

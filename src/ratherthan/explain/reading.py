@@ -16,11 +16,13 @@ from ratherthan.explain.explanation import (
     Explanation,
     Further,
     Judged,
+    LeftOut,
     Measured,
     ObjectiveRecord,
     Opening,
     PolicyRecord,
     PolicyRows,
+    Rank,
     StateRecord,
     Step,
     Tally,
@@ -58,6 +60,8 @@ def from_document(document: Mapping[str, Any]) -> tuple[Explanation, str]:
         search=search,
         tolerance=_real(document["tolerance"]),
         detail=document["detail"],
+        at_most=document.get("at_most"),
+        ranking=document.get("ranking", "detour"),
     )
     arrival = document["arrival_bounds"]
     size = document["model"]
@@ -92,6 +96,7 @@ def from_document(document: Mapping[str, Any]) -> tuple[Explanation, str]:
             largest_difference=_maybe(document["closing"]["largest_difference"]),
             off_route=document["closing"]["off_route"],
             off_route_open=document["closing"]["off_route_open"],
+            left_out=_as_left_out(document["closing"].get("left_out")),
         ),
         states={int(state): _as_state(record) for state, record in document["states"].items()},
         size=(size["states"], size["choices"], size["branches"]),
@@ -163,6 +168,18 @@ def _maybe(value: float | str | None) -> float | None:
     return None if value is None else float(value)
 
 
+def _as_left_out(left: Mapping[str, Any] | None) -> LeftOut | None:
+    if left is None:
+        return None
+    return LeftOut(steps=left["steps"], unsure=left["unsure"], largest=tuple(_maybe(most) for most in left["largest"]))
+
+
+def _as_rank(rank: Mapping[str, Any] | None) -> Rank | None:
+    if rank is None:
+        return None
+    return Rank(level=rank["level"], size=_real(rank["size"]), settled=rank["settled"])
+
+
 def _as_interval(document: Mapping[str, Any]) -> Interval:
     return Interval(value=_real(document["value"]), lower=_real(document["lower"]), upper=_real(document["upper"]))
 
@@ -228,6 +245,8 @@ def _as_step(step: Mapping[str, Any]) -> Step:
         trades=tuple(_as_trade(trade) for trade in step["trades"]),
         told=step.get("told", True),
         alternatives=tuple(Alternative(**other) for other in step.get("alternatives", ())),
+        rank=_as_rank(step.get("rank")),
+        numbers=tuple(tuple(map(_as_measured, level)) for level in step.get("numbers", ())),
     )
 
 

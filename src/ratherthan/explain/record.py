@@ -18,6 +18,7 @@ from ratherthan.explain.explanation import (
     Evidence,
     Explanation,
     Judged,
+    LeftOut,
     Measured,
     StateRecord,
     Step,
@@ -75,6 +76,7 @@ def frame_of(explanation: Explanation, text: str) -> Document:
         "search": {"horizon": asked.search.horizon, "toward_goal": asked.search.toward_goal},
         "tolerance": asked.tolerance,
         "detail": asked.detail,
+        **({} if asked.at_most is None else {"at_most": asked.at_most, "ranking": asked.ranking}),
         "text": text,
         "start": explanation.start,
         "route": list(explanation.route),
@@ -93,6 +95,7 @@ def frame_of(explanation: Explanation, text: str) -> Document:
             "largest_difference": number(explanation.closing.largest_difference),
             "off_route": explanation.closing.off_route,
             "off_route_open": explanation.closing.off_route_open,
+            **_left_out(explanation.closing.left_out),
         },
         "states": {
             str(state): {"name": record.name, "named": record.named, "place": _listed(record.place)}
@@ -115,6 +118,14 @@ def _openings(explanation: Explanation) -> dict[str, Any]:
     """Return the closed cells that would have to open; nothing where there are none."""
     listed = [{"place": list(cell.place), "name": cell.name, "kind": cell.kind} for cell in explanation.openings]
     return {"openings": listed} if listed else {}
+
+
+def _left_out(left: LeftOut | None) -> Document:
+    """Return what is known of the steps that matter and are not told; nothing where there are none."""
+    if left is None:
+        return {}
+    largest = [number(most) for most in left.largest]
+    return {"left_out": {"steps": left.steps, "unsure": left.unsure, "largest": largest}}
 
 
 def digest(document: Mapping[str, Any]) -> str:
@@ -195,6 +206,8 @@ def _step(step: Step, states: Mapping[int, StateRecord]) -> Document:
         ],
         **({} if step.told else {"told": False}),
         **({"alternatives": [asdict(other) for other in step.alternatives]} if step.alternatives else {}),
+        **({} if step.rank is None else {"rank": asdict(step.rank) | {"size": number(step.rank.size)}}),
+        **({"numbers": [[_row(row) for row in level] for level in step.numbers]} if step.numbers else {}),
     }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ratherthan.explain.explanation import VERSION
-from ratherthan.explain.question import FACTORS
+from ratherthan.explain.question import FACTORS, RANKINGS
 
 __all__ = ["CLAIMS", "OBJECTIVES", "RELATIONS", "ROUTE_OUTCOMES", "TRADES", "schema"]
 
@@ -118,8 +118,10 @@ def schema() -> dict[str, Any]:
             "trades": {"type": "array", "items": trade},
             "told": _FLAG,
             "alternatives": {"type": "array", "items": _record({"action": _TEXT, "towards": _COUNT})},
+            "rank": _record({"level": _COUNT, "size": _NUMBER, "settled": _FLAG}),
+            "numbers": {"type": "array", "items": {"type": "array", "items": measured, "minItems": 1}, "minItems": 1},
         },
-        optional=("told", "alternatives"),
+        optional=("told", "alternatives", "rank", "numbers"),
     )
     objective = _record(
         {
@@ -130,6 +132,8 @@ def schema() -> dict[str, Any]:
             "formula": _or_null(_TEXT),
         }
     )
+    numbers = {"type": "array", "items": _or_null(_NUMBER)}
+    left_out = _record({"steps": {"type": "integer", "minimum": 1}, "unsure": _COUNT, "largest": numbers})
     words = {"type": "object", "additionalProperties": _TEXT}
     place = {"type": "array", "items": {"type": "integer"}, "minItems": 2, "maxItems": 2}
     state_record = _record({"name": _TEXT, "named": _FLAG, "place": _or_null(place)})
@@ -153,6 +157,8 @@ def schema() -> dict[str, Any]:
             "search": _record({"horizon": _or_null(_COUNT), "toward_goal": _FLAG}),
             "tolerance": {"type": "number", "exclusiveMinimum": 0},
             "detail": _FLAG,
+            "at_most": {"type": "integer", "minimum": 1},
+            "ranking": {"enum": list(RANKINGS)},
             "text": _TEXT,
             "start": _COUNT,
             "route": _STATES,
@@ -172,7 +178,9 @@ def schema() -> dict[str, Any]:
                     "largest_difference": _or_null(_NUMBER),
                     "off_route": _COUNT,
                     "off_route_open": _COUNT,
-                }
+                    "left_out": left_out,
+                },
+                optional=("left_out",),
             ),
             "states": {
                 "type": "object",
@@ -201,7 +209,7 @@ def schema() -> dict[str, Any]:
             "world": _world(),
             "digest": {"type": "string", "pattern": "^sha256:[0-9a-f]{64}$"},
         },
-        optional=("openings", "world"),
+        optional=("openings", "world", "at_most", "ranking"),
     )
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -98,4 +98,4 @@ def counted(phrase: str) -> str:
     >>> [counted(phrase) for phrase in ("1 steps", "11 steps", "a risk of 1")]
     ['1 step', '11 steps', 'a risk of 1']
     """
-    return phrase.removesuffix("s") if re.fullmatch(r"1 [^ ]*s", phrase) else phrase
+    return phrase.removesuffix("s") if re.fullmatch(r"1 ([^ ]+ )*[^ ]+s", phrase) else phrase

@@ -13,13 +13,17 @@ from ratherthan.explain.telling import told_groups
 from ratherthan.model.lexicon import Lexicon
 from ratherthan.narrate.closed import no_way_through
 from ratherthan.narrate.contrast import contrast_reason
+from ratherthan.narrate.details import details
+from ratherthan.narrate.leaving import left_out
 from ratherthan.narrate.numbers import at_most, percent
-from ratherthan.narrate.reasons import details, reason
+from ratherthan.narrate.reasons import reason
+from ratherthan.narrate.runs import run_sentence
+from ratherthan.narrate.sentence import Sentence
 from ratherthan.narrate.trades import asides, totals, traded, unbeaten
 from ratherthan.narrate.words import Vocabulary, vocabulary
 from ratherthan.solve.solution import Outcome
 
-__all__ = ["narrate"]
+__all__ = ["narrate", "sentences"]
 
 
 def narrate(explanation: Explanation, *, lexicon: Lexicon | None = None) -> str:
@@ -36,18 +40,30 @@ def narrate(explanation: Explanation, *, lexicon: Lexicon | None = None) -> str:
     str
         One line, without a line end; empty for the kind "none".
     """
+    return " ".join(sentence.text for sentence in sentences(explanation, lexicon=lexicon))
+
+
+def sentences(explanation: Explanation, *, lexicon: Lexicon | None = None) -> tuple[Sentence, ...]:
+    """Return the sentences of an explanation: first those about steps, numbered, then what is said of the whole.
+
+    Parameters
+    ----------
+    explanation : Explanation
+    lexicon : Lexicon, optional
+        Other words than the explanation's own.
+    """
     words = vocabulary(explanation if lexicon is None else replace(explanation, lexicon=lexicon))
     if explanation.question.scope == "none":
-        return ""
+        return ()
     if explanation.question.scope == "state":
-        return _state_text(words)
-    return _route_text(words)
+        return _of_state(words)
+    return _of_route(words)
 
 
-def _state_text(words: Vocabulary) -> str:
+def _of_state(words: Vocabulary) -> tuple[Sentence, ...]:
     explanation = words.explanation
     if not explanation.steps:
-        return _end(words)
+        return (Sentence(text=_end(words)),)
     step = explanation.steps[0]
     if step.foil is not None:
         template: str = words.table("sentences")["rather_than"]
@@ -57,8 +73,13 @@ def _state_text(words: Vocabulary) -> str:
             reason=_after(words, step, why),
             **_parts(words, step),
         )
-        return said + more
-    return " ".join([_sentence(words, "alone", step), *_unproved(words)])
+        return (Sentence(text=said + more, steps=(0,), number=1),)
+    told = Sentence(text=_sentence(words, "alone", step), steps=(0,), number=1)
+    return (told, *_plain(_unproved(words)))
+
+
+def _plain(texts: Sequence[str]) -> tuple[Sentence, ...]:
+    return tuple(Sentence(text=text) for text in texts)
 
 
 def _unproved(words: Vocabulary) -> list[str]:
@@ -78,24 +99,25 @@ def _end(words: Vocabulary) -> str:
     return template.format(place=words.place(explanation.start), arrive=words.objective["arrive"])
 
 
-def _route_text(words: Vocabulary) -> str:
+def _of_route(words: Vocabulary) -> tuple[Sentence, ...]:
     explanation = words.explanation
     if explanation.route_outcome in ("there", "ended"):
-        return _end(words)
+        return _plain([_end(words)])
     if explanation.route_outcome == "no way":
-        return _no_way(words)
+        return _plain([_no_way(words)])
     if not explanation.steps:  # a policy that says nothing where it starts
-        return str(words.table("route")["remain"].format(place=words.place(explanation.start)))
+        return _plain([words.table("route")["remain"].format(place=words.place(explanation.start))])
     selective = "selectiveness" in explanation.question.factors
-    told = [explanation.steps[place] for group in told_groups(explanation) for place in group]
-    sentences = _told(words, told, selective=selective)
+    groups = told_groups(explanation)
+    told = [explanation.steps[place] for group in groups for place in group]
+    whole = left_out(words)
     if selective:
-        sentences += _closing(words, told)
+        whole += _closing(words, told)
     if explanation.route_outcome == "circles":
-        sentences.append(_circle(words))
-    sentences += _open_end(words)
-    more = _chances(words) + unbeaten(words, told) + totals(words) + _unproved(words)
-    return " ".join(sentences + more)
+        whole.append(_circle(words))
+    whole += _open_end(words)
+    whole += _chances(words) + unbeaten(words, told) + totals(words) + _unproved(words)
+    return (*_told(words, groups, selective=selective), *_plain(whole))
 
 
 def _open_end(words: Vocabulary) -> list[str]:
@@ -112,14 +134,20 @@ def _open_end(words: Vocabulary) -> list[str]:
     return [table["again_surely" if surely else "again"].format(place=words.place(last))]
 
 
-def _told(words: Vocabulary, steps: Sequence[Step], *, selective: bool) -> list[str]:
-    """Return a sentence per step, with First, …, Finally around them."""
-    between = words.table("order")["selective" if selective else "plain"]
-    last = len(steps) - 1
-    if last == 0:
-        return [_sentence(words, "alone", steps[0])]
-    places = ["first" if i == 0 else "finally" if i == last else between[(i - 1) % 2] for i in range(len(steps))]
-    return [_sentence(words, place, step) for place, step in zip(places, steps, strict=True)]
+def _told(words: Vocabulary, groups: Sequence[tuple[int, ...]], *, selective: bool) -> list[Sentence]:
+    """Return a sentence per group of steps, with First, …, Finally around them."""
+    between, steps = words.table("order")["selective" if selective else "plain"], words.explanation.steps
+    last, found, before = len(groups) - 1, [], -1
+    for i, group in enumerate(groups):
+        place = "first" if i == 0 else "finally" if i == last else between[(i - 1) % 2]
+        place = place if last else "alone"
+        if len(group) == 1:
+            text = _sentence(words, place, steps[group[0]])
+        else:
+            text = run_sentence(words, place, group, begun=group[0] == before + 1 and i > 0)
+        found.append(Sentence(text=text, steps=group, number=i + 1))
+        before = group[-1]
+    return found
 
 
 def _sentence(words: Vocabulary, place: str, step: Step) -> str:
@@ -157,6 +185,7 @@ def _closing(words: Vocabulary, told: Sequence[Step]) -> list[str]:
         sentences.append(route[key].format(noun=noun, largest=at_most(most)))
     elif closing.printed:
         key = "equivalent" if closing.largest_difference == 0.0 else "at_most"
+        key += "" if closing.left_out is None else "_besides"
         largest = "" if closing.largest_difference is None else at_most(closing.largest_difference)
         sentences.append(route[key].format(noun=noun, largest=largest))
     for level in range(_levels(words)):

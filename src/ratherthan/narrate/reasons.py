@@ -8,7 +8,7 @@ from ratherthan.explain.explanation import Claim, Measured, Step
 from ratherthan.narrate.evidence import alternatives, claims_at, measured
 from ratherthan.narrate.words import Vocabulary, Wanted
 
-__all__ = ["details", "reason"]
+__all__ = ["reason"]
 
 _SIMPLE = {
     "best": "best",
@@ -19,34 +19,43 @@ _SIMPLE = {
 }
 
 
-def reason(words: Vocabulary, step: Step) -> str:
-    """Return why: the words of the outcome claims and the flexibility claim together."""
+def reason(words: Vocabulary, step: Step, *, figures: bool = True) -> str:
+    """Return why: the words of the outcome claims and the flexibility claim together.
+
+    Parameters
+    ----------
+    words : Vocabulary
+    step : Step
+    figures : bool
+        Whether numbers are said; of a run they differ from step to step.
+    """
     claims = claims_at(step, 0)
     key, outcome = _outcome(words, claims, words.objectives[0])
     flexible = "flexible" if "most flexible" in claims else "plain"
     if outcome is None and "equally flexible" in claims and words.explanation.question.factors == {"constrictiveness"}:
         flexible = "same"
-    further = "".join(_further(words, step, level) for level in range(1, len(words.explanation.levels)))
+    levels = range(1, len(words.explanation.levels))
+    further = "".join(_further(words, step, level, figures=figures) for level in levels)
     if further and flexible == "flexible":
         flexible, further = "plain", further + words.table("further_levels")["flexible"]
     template: str = words.table("reasons")[key][flexible]
-    return template.format(**_filled(words, words.objectives[0], key, outcome)) + further
+    return template.format(**_filled(words, words.objectives[0], key, outcome, figures=figures)) + further
 
 
-def _further(words: Vocabulary, step: Step, level: int) -> str:
+def _further(words: Vocabulary, step: Step, level: int, *, figures: bool) -> str:
     """Return what a further level adds; nothing where it has no claim."""
     key, outcome = _outcome(words, claims_at(step, level), words.objectives[level])
     if outcome is None:
         return ""
     template: str = words.table("further_levels")[key]
-    return template.format(**_filled(words, words.objectives[level], key, outcome))
+    return template.format(**_filled(words, words.objectives[level], key, outcome, figures=figures))
 
 
-def _filled(words: Vocabulary, wanted: Wanted, key: str, outcome: Claim | None) -> dict[str, str]:
+def _filled(words: Vocabulary, wanted: Wanted, key: str, outcome: Claim | None, *, figures: bool) -> dict[str, str]:
     filled = dict(wanted.words)
     if outcome is not None and key.startswith(("worse", "step_finite", "step_dead", "step_fail")):
         filled |= alternatives(words, wanted, outcome)
-    return filled
+    return filled if figures else filled | {"numbers": "", "values": ""}
 
 
 def _outcome(words: Vocabulary, claims: Mapping[str, Claim], wanted: Wanted) -> tuple[str, Claim | None]:
@@ -74,20 +83,3 @@ def _without_end(row: Measured, wanted: Wanted) -> bool:
 def _infinite_others(claim: Claim) -> str:
     infinite = [measured(other).fate is not None for other in claim.evidence.others]
     return "_infinite" if all(infinite) else "_mixed" if any(infinite) else ""
-
-
-def details(words: Vocabulary, step: Step) -> str:
-    """Return what the alternatives would lead to, if it was asked for."""
-    if not words.explanation.question.detail:
-        return ""
-    table, parts = words.table("details"), []
-    step_only = "_step" if words.explanation.question.policy_values else ""
-    for claim in step.claims:
-        if claim.claim == "only way on":
-            parts.append(table["only_way"])
-        if claim.claim == "avoids":
-            for fate, key in (("dead end", "dead_end"), ("may fail", "may_fail" + step_only)):
-                actions = [row.action for row in claim.evidence.others if measured(row).fate == fate]
-                if actions:
-                    parts.append(table[key].format(others=words.alternatives(actions)))
-    return "".join(parts)

@@ -15,11 +15,47 @@ from xml.sax.saxutils import escape, quoteattr
 from ratherthan.errors import MissingExtraError, SourceError
 from ratherthan.render.palette import INK, PAPER
 
-__all__ = ["Canvas", "Picture", "cut", "element", "number", "text_width", "wrapped"]
+__all__ = ["Canvas", "Parts", "Picture", "cut", "element", "number", "text_width", "wrapped"]
 
 FONT = "'DejaVu Sans', Verdana, 'Segoe UI', Helvetica, Arial, sans-serif"
 NARROW, WIDE = frozenset("fijlrtI.,:;'|!()[]{} "), frozenset("mwMWGOQ%@—–→►")
 MOST_PIXELS = 120_000_000
+EDGE = 12.0
+"""How much is seen around the body of a picture whose words are set elsewhere: marks may reach over its border."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parts:
+    """A picture taken apart, for a page that sets the words around it itself.
+
+    Parameters
+    ----------
+    body : str
+        What is drawn, as SVG, without the words around it.
+    width, height : float
+        Of that.
+    title, description, caption : str
+    legend : tuple of (str, str)
+        For each line an example as SVG, and what it means.
+    """
+
+    body: str
+    width: float
+    height: float
+    title: str
+    description: str
+    caption: str
+    legend: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """Where on a canvas a body is drawn, among which of its elements, and the words around it."""
+
+    begin: int
+    box: tuple[float, float, float, float]
+    caption: str
+    legend: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,11 +67,14 @@ class Picture:
     svg : str
     width, height : float
         In its own units, of which 96 are an inch.
+    parts : Parts, optional
+        The same taken apart, where there are words around a body.
     """
 
     svg: str
     width: float
     height: float
+    parts: Parts | None = None
 
     def save(self, path: str | os.PathLike[str], *, scale: float = 2.0) -> None:
         """Write the picture to a file, whole or not at all.
@@ -108,22 +147,43 @@ class Canvas:
     description: str
     parts: list[str] = field(default_factory=list)
     definitions: dict[str, str] = field(default_factory=dict)
+    body: Body | None = None
 
     def picture(self) -> Picture:
         """Return the picture."""
-        width, height = number(self.width), number(self.height)
+        whole = self._svg((0.0, 0.0, self.width, self.height), self.parts)
+        return Picture(svg=whole, width=self.width, height=self.height, parts=self._apart())
+
+    def _apart(self) -> Parts | None:
+        """Return the picture taken apart, None where it has no body of its own."""
+        if self.body is None:
+            return None
+        x, y, width, height = self.body.box
+        box = (x - EDGE, y - EDGE, width + 2 * EDGE, height + 2 * EDGE)
+        return Parts(
+            body=self._svg(box, self.parts[self.body.begin :]),
+            width=box[2],
+            height=box[3],
+            title=self.title,
+            description=self.description,
+            caption=self.body.caption,
+            legend=self.body.legend,
+        )
+
+    def _svg(self, box: tuple[float, float, float, float], parts: Sequence[str]) -> str:
+        """Return what is within a box as SVG."""
+        x, y, width, height = map(number, box)
         defined = "".join(f"\n{self.definitions[name]}" for name in sorted(self.definitions))
         head = (
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" '
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="{x} {y} {width} {height}" '
             f'role="img" aria-labelledby="title description" font-family={quoteattr(FONT)}>\n'
             f'<title id="title">{escape(_clean(self.title))}</title>\n'
             f'<desc id="description">{escape(_clean(self.description))}</desc>\n'
         )
         defs = f"<defs>{defined}\n</defs>\n" if defined else ""
-        paper = f'<rect width="{width}" height="{height}" fill="{PAPER}"/>\n'
-        return Picture(
-            svg=head + defs + paper + "\n".join(self.parts) + "\n</svg>\n", width=self.width, height=self.height
-        )
+        corner = "" if (x, y) == ("0", "0") else f'x="{x}" y="{y}" '
+        paper = f'<rect {corner}width="{width}" height="{height}" fill="{PAPER}"/>\n'
+        return head + defs + paper + "\n".join(parts) + "\n</svg>\n"
 
     def define(self, name: str, element: str) -> str:
         """Keep an element under a name among the definitions, and return the name."""

@@ -1,9 +1,11 @@
-"""An Explanation or a Solution enters, a Picture leaves."""
+"""An Explanation, a Solution or a model enters, a Picture leaves."""
 
 from __future__ import annotations
 
 from ratherthan.errors import QuestionError
 from ratherthan.explain.explanation import Explanation
+from ratherthan.model.mdp import MDP
+from ratherthan.model.problem import Problem
 from ratherthan.render.canvas import Picture
 from ratherthan.solve.solution import Solution
 
@@ -14,26 +16,31 @@ VIEWS = ("route", "graph", "value", "spread", "policy", "trees", "factors")
 
 
 def draw(
-    thing: Explanation | Solution,
+    thing: Explanation | Solution | Problem | MDP,
     what: str | None = None,
     *,
     state: int | None = None,
     rather_than: str | None = None,
+    room: tuple[float, float] | None = None,
 ) -> Picture:
-    """Draw an explanation or a solution.
+    """Draw an explanation, a solution or a model.
 
     Parameters
     ----------
-    thing : Explanation or Solution
+    thing : Explanation, Solution, Problem or MDP
     what : str, optional
         Of an Explanation: "route", its route on the map with the decisions that matter (the default; without a map as
         "graph"), or "graph", a line of states. Of a Solution: "value", a map of the values (the default), "spread", of how
         much the decision in each cell matters, "policy", arrows; "trees", the search trees of two actions, or "factors",
-        bars of the three factors of each action, both of `state`.
+        bars of the three factors of each action, both of `state`. Of a Problem or an MDP: its map with nothing on it but the
+        start and the destination; without a map a graph of the states around the start.
     state : int, optional
         For "trees" and "factors"; by default the only initial state.
     rather_than : str, optional
         For "trees": the action beside the one that is taken.
+    room : (float, float), optional
+        Of an Explanation: how wide and high the map may be, or how wide the graph, without the words around it; 96 units are
+        an inch.
 
     Returns
     -------
@@ -53,13 +60,21 @@ def draw(
     True
     """
     if isinstance(thing, Explanation):
-        return _explanation(thing, what, asked=state is not None or rather_than is not None)
+        return _explanation(thing, what, asked=state is not None or rather_than is not None, room=room)
     if isinstance(thing, Solution):
         return _solution(thing, what or "value", state, rather_than)
-    raise QuestionError(f"An Explanation or a Solution can be drawn, got {type(thing).__name__}.")
+    if isinstance(thing, Problem | MDP):
+        if not (what is None and state is None and rather_than is None and room is None):
+            raise QuestionError("A model alone is drawn as it is: solve it first to see more.")
+        from ratherthan.render.modelview import draw_model
+
+        return draw_model(thing)
+    raise QuestionError(f"An Explanation, a Solution or a model can be drawn, got {type(thing).__name__}.")
 
 
-def _explanation(explanation: Explanation, what: str | None, *, asked: bool) -> Picture:
+def _explanation(
+    explanation: Explanation, what: str | None, *, asked: bool, room: tuple[float, float] | None
+) -> Picture:
     if asked:
         raise QuestionError("An explanation has its own state and actions: leave state and rather_than out.")
     if what not in (None, "route", "graph"):
@@ -67,10 +82,10 @@ def _explanation(explanation: Explanation, what: str | None, *, asked: bool) -> 
     if what != "graph" and explanation.world is not None:
         from ratherthan.render.mapview import draw_map
 
-        return draw_map(explanation)
+        return draw_map(explanation) if room is None else draw_map(explanation, room)
     from ratherthan.render.graphview import draw_graph
 
-    return draw_graph(explanation)
+    return draw_graph(explanation) if room is None else draw_graph(explanation, room[0])
 
 
 def _solution(solution: Solution, what: str, state: int | None, rather_than: str | None) -> Picture:

@@ -29,6 +29,8 @@ MOST_SHOWN = 24
 """How many decisions are drawn at most."""
 MOST_FOILS = 3
 ABOVE, BELOW = 36.0, 44.0
+STUB = 18.0
+"""How long the arrow is that leaves a line; the name of its action stands after it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,19 +43,22 @@ class _Place:
     line: int
 
 
-def draw_graph(explanation: Explanation) -> Picture:
+def draw_graph(explanation: Explanation, across: float = ACROSS) -> Picture:
     """Return the picture of an explanation as a graph of its route.
 
     Parameters
     ----------
     explanation : Explanation
+    across : float
+        How wide a line of states may be.
     """
-    return _Graph(explanation=explanation).picture()
+    return _Graph(explanation=explanation, across=across).picture()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Graph:
     explanation: Explanation
+    across: float
 
     @cached_property
     def said(self) -> dict[str, dict[str, str]]:
@@ -74,13 +79,18 @@ class _Graph:
         }
         return dict(list(found.items())[:MOST_SHOWN])
 
+    @property
+    def groups(self) -> list[tuple[int, ...]]:
+        """The steps of each sentence that has a number here."""
+        return [group for group in told_groups(self.explanation) if group[0] in self.numbers]
+
     @cached_property
     def kept(self) -> list[int]:
         """The places along the route that are drawn."""
         last = len(self.route) - 1
         if last < SHORT:
             return list(range(last + 1))
-        near = {0, 1, last - 1, last} | {at + more for at in self.numbers for more in (0, 1)}
+        near = {0, 1, last - 1, last} | {at for group in self.groups for at in (group[0], group[0] + 1, group[-1] + 1)}
         return sorted(at for at in near if at <= last)
 
     @cached_property
@@ -91,7 +101,7 @@ class _Graph:
         for at in self.kept:
             width = self.width(self.route[at])
             space = 0.0 if before < 0 else self.space(before) if at == before + 1 else GAP
-            if x + space + width > ACROSS and found:
+            if x + space + width > self.across and found:
                 x, line, space = (0.0 if at == before + 1 else GAP), line + 1, 0.0
             found.append(_Place(at=at, x=x + space + width / 2, width=width, line=line))
             x, before = x + space + width, at
@@ -136,7 +146,8 @@ class _Graph:
         )
         if self.numbers and explanation.question.scope == "route":
             caption += " " + table["numbered"]
-        hidden = sum(step.critical is not False for step in explanation.steps) - len(self.numbers)
+        told = {at for group in self.groups for at in group}
+        hidden = sum(step.critical is not False and at not in told for at, step in enumerate(explanation.steps))
         if explanation.question.scope == "route" and hidden > 0:
             caption += " " + table["untold_one" if hidden == 1 else "untold"].format(count=hidden)
         spoken = f"{self.said['graph']['description'].format(steps=steps)} {caption}"
@@ -159,9 +170,13 @@ class _Graph:
         return body.canvas.picture()
 
     def reach(self, place: _Place) -> float:
-        """Return how far right the words of the alternatives at a place go."""
+        """Return how far right the words at a place go: of its alternatives, and of the action with which a line ends."""
         said = [cut(f"{action} → {there}", 2 * WIDEST, SMALL) for action, there in self.foils(place.at)]
-        return place.x + 14.0 + max((text_width(one, SMALL) for one in said), default=0.0)
+        foils = place.x + 14.0 + max((text_width(one, SMALL) for one in said), default=0.0)
+        if not any(other.at == place.at + 1 and other.line > place.line for other in self.places):
+            return foils
+        action = cut(self.explanation.steps[place.at].action, WIDEST, SMALL)
+        return max(foils, place.x + place.width / 2 + STUB + 5.0 + text_width(action, SMALL))
 
     def edges(self, canvas: Canvas, left: float, tops: list[float]) -> None:
         """Draw the arrows of the route, and its gaps."""
@@ -179,7 +194,9 @@ class _Graph:
                 else:
                     y = tops[one.line]
                     right = left + one.x + one.width / 2
-                    arrow(canvas, (right, y), (right + 18.0, y), colour=ROUTE, dash=None, width=2.5)
+                    arrow(canvas, (right, y), (right + STUB, y), colour=ROUTE, dash=None, width=2.5)
+                    said = cut(self.explanation.steps[one.at].action, WIDEST, SMALL)
+                    canvas.text(right + STUB + 5.0, y + 0.36 * SMALL, said, size=SMALL)
                 continue
             skipped = other.at - one.at
             said = table["gap_one" if skipped == 1 else "gap"].format(count=skipped)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ratherthan.render.canvas import Canvas, cut, text_width
-from ratherthan.render.palette import QUIET, Look
+from ratherthan.render.canvas import Canvas, cut, number, text_width
+from ratherthan.render.palette import PAPER, QUIET, Look
 
-__all__ = ["Entry", "draw_legend", "legend_height", "legend_width", "swatch"]
+__all__ = ["Entry", "draw_legend", "legend_height", "legend_width", "sample_of", "swatch"]
 
 SIZE = 13.0
 ROW = 24.0
@@ -56,6 +56,17 @@ def draw_legend(canvas: Canvas, entries: Sequence[Entry], x: float, y: float, wi
         entry.sample(canvas, left + 15.0, middle)
         said = cut(entry.words, min(step, x + width - left) - SWATCH - 2.0, SIZE)
         canvas.text(left + SWATCH + 2.0, middle + 0.36 * SIZE, said, size=SIZE)
+
+
+def sample_of(entry: Entry) -> str:
+    """Return the example of a line of a legend as a picture of its own; the words beside it say what it is."""
+    width, height = SWATCH + 2.0, ROW
+    canvas = Canvas(width=width, height=height, title="", description="")
+    canvas.rect(0.0, 0.0, width, height, fill=PAPER)
+    entry.sample(canvas, width / 2.0, height / 2.0)
+    size = f'width="{number(width)}" height="{number(height)}" viewBox="0 0 {number(width)} {number(height)}"'
+    inside = "".join([*(canvas.definitions[name] for name in sorted(canvas.definitions)), *canvas.parts])
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size} aria-hidden="true">{inside}</svg>'
 
 
 def swatch(look: Look, pattern: Callable[[Canvas, Look], str | None]) -> Sample:

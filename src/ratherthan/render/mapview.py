@@ -20,7 +20,7 @@ from ratherthan.render.canvas import Canvas, Picture, cut, text_width
 from ratherthan.render.cropping import cropped
 from ratherthan.render.ground import View, draw_ground, fitted
 from ratherthan.render.mapwords import MapWords
-from ratherthan.render.marks import Marks, Room, arrow, route_line
+from ratherthan.render.marks import Marks, Room, arrow, route_line, stretch_line
 from ratherthan.render.overlay import draw_crosses, draw_zone
 from ratherthan.render.palette import ROAD, ink_on, looks_of
 from ratherthan.render.rulers import draw_rulers, ruler_room
@@ -47,13 +47,15 @@ NARROW = 40.0
 Point = tuple[float, float]
 
 
-def draw_map(explanation: Explanation) -> Picture:
+def draw_map(explanation: Explanation, room: tuple[float, float] = ROOM) -> Picture:
     """Return the picture of an explanation on its map.
 
     Parameters
     ----------
     explanation : Explanation
         With a world.
+    room : (float, float)
+        How wide and high the map may be.
     """
     assert explanation.world is not None
     world, corner = cropped(explanation.world)
@@ -61,7 +63,7 @@ def draw_map(explanation: Explanation) -> Picture:
         not (0 <= x - corner[0] < world.width and 0 <= y - corner[1] < world.height) for x, y in _places(explanation)
     ):
         world, corner = explanation.world, (0, 0)
-    return _Map(explanation=explanation, world=world, corner=corner).picture()
+    return _Map(explanation=explanation, world=world, corner=corner, room=room).picture()
 
 
 def _places(explanation: Explanation) -> list[tuple[int, int]]:
@@ -75,6 +77,7 @@ class _Map:
     explanation: Explanation
     world: WorldRecord
     corner: tuple[int, int]
+    room: tuple[float, float]
 
     @cached_property
     def said(self) -> dict[str, dict[str, str]]:
@@ -93,7 +96,7 @@ class _Map:
     def view(self) -> View:
         """Where the cells lie, from the corner of the body on."""
         left, _ = ruler_room(self.world)
-        fit = fitted(self.world, 0.0, 0.0, ROOM)
+        fit = fitted(self.world, 0.0, 0.0, self.room)
         pad = NARROW if min(fit.width, fit.height) < NARROW * 3 else 0.0
         return View(x=left + pad, y=pad, cell=fit.cell, columns=fit.columns, rows=fit.rows)
 
@@ -179,6 +182,7 @@ class _Map:
             world=self.world,
             numbers=list(self.numbers),
             hidden=len(self.hidden),
+            stretches=bool(self.stretches),
             foils=any(self.drawn(self.explanation.steps[step]) for step in self.marks),
             too_long=[name for name in zones if self.zone_label(name) != name],
         ).sheet()
@@ -240,6 +244,11 @@ class _Map:
         explanation, marks = self.explanation, Marks(canvas)
         points = [point for state in explanation.route if (point := self.place(view, state)) is not None]
         self.foils(canvas, view)
+        for step, group in self.stretches.items():
+            along = [self.place(view, state) for state in explanation.route[group[0] : group[-1] + 2]]
+            line = [point for point in along if point is not None]
+            if len(line) > 1:
+                stretch_line(canvas, line, class_="stretch", data_sentence=str(self.numbers[step]))
         route_line(canvas, points, width=4.0 if view.cell >= 4.0 else 2.5)
         for place in self.goals(view):
             marks.goal(place)
@@ -256,7 +265,14 @@ class _Map:
     def hidden(self) -> list[int]:
         """The steps that matter and bear no number."""
         steps = enumerate(self.explanation.steps)
-        return [place for place, step in steps if step.critical is not False and place not in self.marks]
+        shown = {place for step, group in self.stretches.items() for place in group} | set(self.marks)
+        return [place for place, step in steps if step.critical is not False and place not in shown]
+
+    @cached_property
+    def stretches(self) -> dict[int, tuple[int, ...]]:
+        """The steps that are told in one sentence with the one that bears its number, where these are several."""
+        groups = told_groups(self.explanation)
+        return {group[0]: group for group in groups if len(group) > 1 and group[0] in self.marks}
 
     def foils(self, canvas: Canvas, view: View) -> None:
         """Draw where the alternatives would have led, dashed."""

@@ -12,7 +12,7 @@ from ratherthan.explain.places import WorldRecord
 from ratherthan.render.canvas import Canvas
 from ratherthan.render.ground import View, pattern_of
 from ratherthan.render.legend import Entry, swatch
-from ratherthan.render.marks import FEW, Marks, arrow, route_line
+from ratherthan.render.marks import FEW, Marks, arrow, route_line, stretch_line
 from ratherthan.render.overlay import draw_crosses, draw_zone
 from ratherthan.render.palette import PAPER, ROAD, ROUTE, looks_of
 from ratherthan.render.sheet import Sheet
@@ -37,6 +37,8 @@ class MapWords:
         The steps that are told and matter.
     hidden : int
         How many decisions matter and bear no number.
+    stretches : bool
+        Whether several steps are told in one sentence.
     foils : bool
         Whether alternatives are drawn.
     too_long : sequence of str
@@ -47,6 +49,7 @@ class MapWords:
     world: WorldRecord
     numbers: Sequence[int]
     hidden: int
+    stretches: bool
     foils: bool
     too_long: Sequence[str]
 
@@ -70,6 +73,9 @@ class MapWords:
         """Return what the picture shows."""
         explanation, table = self.explanation, self.said["map"]
         outcome, steps = explanation.route_outcome, max(0, len(explanation.route) - 1)
+        if explanation.question.scope == "none":
+            counts = (f"{count:,}" for count in explanation.size)
+            return table["model"].format(**dict(zip(("states", "choices", "branches"), counts, strict=True)))
         key = {"arrives": "route", "there": "there", "ended": "ended", "no way": "no_route", "none": "alone"}.get(
             outcome, "open"
         )
@@ -94,6 +100,8 @@ class MapWords:
     def _spoken(self) -> str:
         """Return the caption with the places of the decisions, for those who do not see them."""
         table = self.said["map"]
+        if self.explanation.question.scope == "none":
+            return self._caption()
         named = [place_of(self.explanation, self.explanation.steps[step].state) for step in self.numbers]
         key = "no_marks" if not named else "one_mark" if len(named) == 1 else "marks"
         more = "; …" if len(named) > MOST_NAMED else ""
@@ -104,7 +112,9 @@ class MapWords:
         """Return the lines of the legend: what is to be seen, and nothing else."""
         table, explanation = self.said["legend"], self.explanation
         first = "asked_state" if explanation.question.scope == "state" else "start"
-        found = [Entry(words=table[first], sample=lambda c, x, y: Marks(c).start((x, y), radius=5.0))]
+        found = []
+        if explanation.start in explanation.states:
+            found.append(Entry(words=table[first], sample=lambda c, x, y: Marks(c).start((x, y), radius=5.0)))
         if self.world.goals.any():
             found.append(
                 Entry(words=table["goal"], sample=lambda c, x, y: Marks(c).goal((x - 3.0, y + 1.0), radius=6.5))
@@ -114,6 +124,8 @@ class MapWords:
         if self.numbers:
             key = "critical" if explanation.question.scope == "route" else "asked"
             found.append(Entry(words=table[key], sample=lambda c, x, y: Marks(c).numbered((x, y), "1", radius=8.0)))
+        if self.stretches:
+            found.append(Entry(words=table["stretch"], sample=_stretch))
         if self.hidden:
             sample = _pearls if self.hidden > FEW else _hollow
             found.append(Entry(words=table["untold"], sample=sample))
@@ -157,6 +169,11 @@ def _zone(canvas: Canvas, x: float, y: float) -> None:
 
 def _hollow(canvas: Canvas, x: float, y: float) -> None:
     Marks(canvas).hollow((x, y))
+
+
+def _stretch(canvas: Canvas, x: float, y: float) -> None:
+    stretch_line(canvas, [(x - 11, y), (x + 11, y)])
+    canvas.path([(x - 14, y), (x + 14, y)], stroke=ROUTE, stroke_width=4.0, stroke_linecap="round")
 
 
 def _pearls(canvas: Canvas, x: float, y: float) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from ratherthan.render.canvas import Canvas, number, text_width
 from ratherthan.render.palette import FOIL, GOAL, INK, MARK, OPENING, PAPER, ROUTE, START
 
-__all__ = ["FEW", "Marks", "Room", "arrow", "route_line"]
+__all__ = ["FEW", "Marks", "Room", "arrow", "route_line", "stretch_line"]
 
 Point = tuple[float, float]
 TURN = math.pi / 4
@@ -39,6 +39,15 @@ def route_line(canvas: Canvas, points: Sequence[Point], *, width: float = 4.0) -
         stroke=PAPER,
         stroke_width=1.0,
     )
+
+
+def stretch_line(canvas: Canvas, points: Sequence[Point], **attributes: object) -> None:
+    """Draw a dark edge on both sides of a part of the route that one sentence tells, to be drawn beneath the route."""
+    points = _straightened(points)
+    canvas.open(**attributes)
+    canvas.path(points, stroke=PAPER, stroke_width=14.0, stroke_linejoin="round", stroke_linecap="round")
+    canvas.path(points, stroke=MARK, stroke_width=11.0, stroke_linejoin="round", stroke_linecap="round")
+    canvas.close()
 
 
 def arrow(

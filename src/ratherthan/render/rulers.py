@@ -73,7 +73,8 @@ def steps_of(span: float, least: float) -> float:
 
 def _cells(count: int, cell: float) -> Iterator[tuple[float, str]]:
     """Yield the middle of each cell that is named on an axis, and its number."""
-    step = max(1, int(steps_of(count, min(APART, max(20.0, cell)) / cell)))
+    apart = max(20.0, text_width(str(count - 1), SIZE) + 8.0)
+    step = max(1, int(steps_of(count, apart / cell)))
     for place in range(0, count, step):
         yield place + 0.5, str(place)
 

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ratherthan.render import canvas as canvases
 from ratherthan.render.canvas import Canvas, text_width, wrapped
-from ratherthan.render.legend import Entry, draw_legend, legend_height, legend_width
+from ratherthan.render.legend import Entry, draw_legend, legend_height, legend_width, sample_of
 from ratherthan.render.palette import QUIET
 
 __all__ = ["MARGIN", "Body", "Sheet", "sheet"]
@@ -77,7 +78,14 @@ def sheet(words: Sheet, width: float, height: float) -> Body:
     canvas.lines(MARGIN, MARGIN + 0.85 * TITLE, title, size=TITLE, font_weight="bold")
     draw_legend(canvas, words.entries, legend_left, legend_top, legend_room)
     canvas.lines(MARGIN, below + 0.7 * MARGIN + CAPTION, caption, size=CAPTION, fill=QUIET)
-    return Body(canvas=canvas, x=MARGIN + (0.0 if beside else (total - width) / 2.0), y=top)
+    left = MARGIN + (0.0 if beside else (total - width) / 2.0)
+    canvas.body = canvases.Body(
+        begin=len(canvas.parts),
+        box=(left, top, width, height),
+        caption=words.caption,
+        legend=tuple((sample_of(entry), entry.words) for entry in words.entries),
+    )
+    return Body(canvas=canvas, x=left, y=top)
 
 
 def _lines(words: str, width: float, size: float) -> list[str]:

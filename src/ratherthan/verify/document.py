@@ -166,6 +166,21 @@ def _refuse_contradictions(told: Explanation) -> None:
             names = (trade.judged[0].other.action,)
             if trade.against != names:
                 refuse(f"'{trade.claim}' must be claimed against the action of its evidence, {names}", trade.against)
+    _refuse_few(told)
+
+
+def _refuse_few(told: Explanation) -> None:
+    """Raise where what is told in few sentences, or said in detail, does not fit the question and its levels."""
+    asked, levels, left = told.question, len(told.levels), told.closing.left_out
+    if asked.at_most is not None and asked.scope != "route":
+        refuse("A number of sentences must be for a route", f"scope '{asked.scope}'")
+    if left is not None and len(left.largest) != levels:
+        refuse(f"The largest difference that is left out must be given for {levels} levels", len(left.largest))
+    for step in told.steps:
+        if step.rank is not None and step.rank.level >= levels:
+            refuse(f"A rank must be of one of {levels} levels", step.rank.level, state=step.state)
+        if len(step.numbers) > levels or len({len(rows) for rows in step.numbers}) > 1:
+            refuse(f"Numbers must be of at most {levels} levels, of the same choices each", len(step.numbers))
 
 
 def _kind_of(asked: Question) -> str:

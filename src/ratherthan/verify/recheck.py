@@ -31,6 +31,9 @@ Compared with the model, each with a verdict:
                                 ``further_spreads`` under ``alpha``, ``impact``, ``values`` and ``tolerance``; every claim at
                                 its ``level`` (`claims`), its numbers, counts (``search``), alternatives and successors;
                                 ``trades`` with every other action (`trades`)
+``told``, ``rank``              where there are few sentences: that those steps are told that rank highest, and the ranks (`few`)
+``numbers``                     what each alternative comes to at each level, where details are given
+``left out``                    how many steps are not told that matter, and by how much they differ at most
 ``closing``                     printed, largest_difference, off_route, off_route_open
 ==============================  =====================================================================================
 
@@ -62,6 +65,7 @@ from ratherthan.model.problem import Problem
 from ratherthan.verify.candidates import Budget
 from ratherthan.verify.closing import ClosingCheck
 from ratherthan.verify.document import OUTCOMES, load, refuse_foreign, refuse_retold
+from ratherthan.verify.few import FewCheck
 from ratherthan.verify.frame import Frame
 from ratherthan.verify.levels import Levels, levels_on
 from ratherthan.verify.missions import TooLargeError
@@ -178,6 +182,7 @@ class _Recheck:
             found.append(self.policy.step(step))
             found += StepCheck(levels=self.levels, step=step).checks()
             found += trades.checks(step)
+        found += FewCheck(told=told, levels=self.levels).checks()
         reached = self.policy.reached([told.start])
         found.append(ClosingCheck(told=told, levels=self.levels, reached=reached).check())
         return found

@@ -14,7 +14,7 @@ from ratherthan.explain.explanation import Claim, Measured, Step
 from ratherthan.verify.claims import ClaimCheck
 from ratherthan.verify.interval import Bounds, Interval, Order, above, order
 from ratherthan.verify.levels import Levels
-from ratherthan.verify.numbers import disagreement
+from ratherthan.verify.numbers import disagreement, vague
 from ratherthan.verify.predicates import COUNTED, FLEXIBLE
 from ratherthan.verify.verdict import Check, Verdict
 
@@ -46,6 +46,9 @@ class StepCheck:
             flaw, is_open = self._claim(claim)
             found.append(self._check(claim.claim, flaw, is_open))
         found.append(self._check("claims", self._together(), is_open=self._unsaid(1) is not None))
+        if self.step.numbers:
+            flaw, is_open = self._numbers()
+            found.append(self._check("numbers", flaw, is_open))
         return found
 
     def _check(self, what: str, flaw: str | None, is_open: bool) -> Check:
@@ -85,7 +88,8 @@ class StepCheck:
         measures = self.levels.measures[level]
         silent = any(map(measures.silent, choices))
         for name, claimed, own in zip(("largest", "smallest"), told, measures.spread(choices), strict=True):
-            flaw = disagreement(claimed, own, self.levels, measures, silent=silent)
+            half_known = math.isinf(claimed.upper) if name == "largest" else math.isinf(claimed.lower)
+            flaw = disagreement(claimed, own, self.levels, measures, silent=silent and not half_known)
             if flaw:
                 return f"the {name} number {flaw}"
         return None
@@ -151,6 +155,30 @@ class StepCheck:
 
     def _own_spread(self, level: int) -> tuple[Bounds, Bounds]:
         return self.levels.measures[level].spread(self._group(level)[0] if level else self._choices)
+
+    def _numbers(self) -> tuple[str | None, bool]:
+        """Return what is wrong with the numbers of all choices that are given for details, and whether they are open."""
+        step, levels, is_open = self.step, self.levels, False
+        if not levels.asked.detail:
+            return "details were not asked for", False
+        running = [k for k, frame in enumerate(levels.frames) if k == 0 or frame.running[step.state]]
+        names = levels.first.mdp.action_name
+        others = [c for c in self._others if step.foil is None or names(c) == step.foil]
+        if len(step.numbers) != len(running) or not levels.first.running[step.state]:
+            return f"there must be numbers of {len(running)} levels, got {len(step.numbers)}", False
+        for level, rows in zip(running, step.numbers, strict=True):
+            if [(row.choice, row.action) for row in rows] != [(c, names(c)) for c in (step.choice, *others)]:
+                return "there must be numbers of the choice taken, and of each other one in turn", False
+            measures = levels.measures[level]
+            for row in rows:
+                own, silent = measures.number(row.choice), measures.silent(row.choice)
+                flaw = disagreement(row.number, own, levels, measures, silent=silent)
+                if flaw is None and row.fate != measures.fate(row.choice) and measures.decided(row.choice):
+                    flaw = f"means '{measures.fate(row.choice)}', got '{row.fate}'"
+                if flaw:
+                    return f"the number of '{row.action}' {flaw}", False
+                is_open |= vague(row.number, own, levels, measures)
+        return None, is_open
 
     # -- claims
 

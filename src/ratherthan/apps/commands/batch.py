@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from ratherthan.apps.limits import Amount, Duration
 from ratherthan.apps.options import Command, argument, option
 
 EXAMPLES = (
@@ -41,18 +42,29 @@ MOST_TOLD = 20
     metavar="ADDRESS",
     help="A Dask scheduler, tcp://host:8786, whose workers do it instead.",
 )
+@option("--time-limit", section="Limits", type=Duration(), metavar="TIME", help="For each row, such as 10s or 2m.")
+@option("--memory-limit", section="Limits", type=Amount(), metavar="SIZE", help="For each process, such as 4GB.")
 def command(
-    *, missions: str, output: str, documents: str | None, resume: bool, workers: int | None, cluster: str | None
+    *,
+    missions: str,
+    output: str,
+    documents: str | None,
+    resume: bool,
+    workers: int | None,
+    cluster: str | None,
+    time_limit: float | None,
+    memory_limit: int | None,
 ) -> int:
     """Explain every row of the table MISSIONS.
 
-    Columns have the names of explain's options: source, property, start, state, rather_than, kind, also, policy and so on; id and
-    those that begin with tag are carried along. Rows of one model share its solving. A row that fails is told and the others
-    are done; then the exit code is not 0.
+    Columns have the names of explain's options: source, property, start, goal, state, rather_than, kind, also, policy and so on;
+    id and those that begin with tag are carried along. Rows of one model share its solving. A row that fails is told and the
+    others are done; then the exit code is not 0.
     """
     from ratherthan.apps.door import say
     from ratherthan.apps.waiting import waiting
     from ratherthan.cluster import explain_many
+    from ratherthan.model.watch import Limits
 
     with waiting("Explaining") as tell:
         found = explain_many(
@@ -62,6 +74,7 @@ def command(
             cluster=cluster,
             resume=resume,
             documents=documents,
+            limits=Limits(seconds=time_limit, memory=memory_limit),
             tell=tell,
             note=say,
         )
