@@ -152,6 +152,30 @@ def test_rewards_beyond_the_range_of_doubles_are_refused() -> None:
         solve(Problem(mdp=mdp), ExpectedCost(goal='"goal"', reward="r"))
 
 
+def test_rewards_below_the_range_of_doubles_are_refused_with_their_place() -> None:
+    mdp = replace(fork("least cost").mdp, rewards={"r": Reward(choice=np.array([1e-300, 0.0, 3e-300, 1e-300, 5e-324]))})
+    with pytest.raises(
+        PropertyError, match=r"the largest of 'r' is 3e-300 at action '.*' of state .*smaller unit"
+    ) as caught:
+        solve(Problem(mdp=mdp), ExpectedCost(goal='"goal"', reward="r"))
+    assert caught.value.choice == 2
+
+
+@pytest.mark.parametrize("scale", [1e-284, 1e-200, 1e200, 1e300])
+def test_rewards_in_any_unit_are_solved_and_proved(scale: float) -> None:
+    plain = fork("least cost")
+    (name,) = plain.mdp.rewards
+    paid = plain.mdp.rewards[name].choice
+    assert paid is not None
+    mdp = replace(plain.mdp, rewards={name: Reward(choice=paid * scale)})
+    one, scaled = solve(plain), solve(replace(plain, mdp=mdp))
+    assert scaled.outcome is one.outcome
+    finite = np.isfinite(one.values[0])
+    assert scaled.values[0][finite] == pytest.approx(one.values[0][finite] * scale, rel=1e-9)
+    assert (scaled.lower[0] <= one.upper[0] * scale * (1 + 1e-12)).all()
+    assert (scaled.upper[0] >= one.lower[0] * scale * (1 - 1e-12)).all()
+
+
 def test_a_policy_may_be_silent_where_it_does_not_come() -> None:
     table: Table = {**FORK, 4: {"on": ([(1.0, 0)], 1)}, 5: {"on": ([(1.0, 4)], 1)}}
     problem = problem_of(table, OBJECTIVES["least cost"], goals=[2], hazards=[3])

@@ -23,6 +23,8 @@ __all__ = ["Paid", "costs_of", "expected_reward", "paid_of"]
 
 SMALLEST = 5e-324
 """The least positive double: a reward that is positive stays so, however small its probability."""
+LEAST_UNIT = 1e-285
+"""How large the largest reward must be at least: rounding is accounted for by terms that are far smaller."""
 
 
 FEW_PARTS = 8
@@ -61,7 +63,7 @@ def expected_reward(mdp: MDP, name: str | None) -> Floats:
     Raises
     ------
     PropertyError
-        If the model has no such reward.
+        If the model has no such reward, or its sums are beyond doubles, or below them.
     """
     if name is None:
         return np.ones(mdp.choices)
@@ -73,7 +75,22 @@ def expected_reward(mdp: MDP, name: str | None) -> Floats:
         )
     total = _total(mdp, reward)
     _refuse_infinite(mdp, name, total)
+    _refuse_tiny(mdp, name, total)
     return total
+
+
+def _refuse_tiny(mdp: MDP, name: str, total: Floats) -> None:
+    """Raise PropertyError where all rewards are so small that their sums and differences fall below doubles."""
+    largest = max(float(total.max(initial=0.0)), -float(total.min(initial=0.0)))
+    if 0.0 < largest < LEAST_UNIT:
+        choice = int(np.argmax(np.abs(total)))
+        raise PropertyError(
+            f"Of rewards some must be at least {LEAST_UNIT:g}, or what they add up to cannot be told in doubles, but the largest of "
+            f"'{name}' is {total[choice]:g} at action '{mdp.action_name(choice)}' of state {mdp.state_of(choice)}. "
+            "Use a smaller unit.",
+            reward=name,
+            choice=choice,
+        )
 
 
 def _refuse_infinite(mdp: MDP, name: str, total: Floats) -> None:
