@@ -19,6 +19,7 @@ BENCHMARKS = (
     "questions",
     "cluster",
     "growth",
+    "study",
 )
 
 
