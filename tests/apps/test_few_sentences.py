@@ -50,3 +50,17 @@ def test_what_makes_no_sense_is_refused_in_one_sentence(ask, words):
     assert result.exit_code == 2
     assert result.stdout == ""
     assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_a_very_long_text_comes_with_the_way_to_a_short_one(process, tmp_path):
+    yard = tmp_path / "yard.map"
+    yard.write_text("type octile\nheight 1\nwidth 60\nmap\n" + "." * 60 + "\n", encoding="ascii")
+    words = ("explain", yard, "--start", "0,0", "--goal", "59,0", "--kind", "naive-path")
+    long = process(*words)
+    assert long.returncode == 0
+    assert b"--at-most 7" in long.stderr
+    assert b"--at-most" not in long.stdout
+    short = process(*words, "--at-most", "3")
+    assert short.returncode == 0
+    assert short.stderr == b""
+    assert len(short.stdout) < len(long.stdout)
