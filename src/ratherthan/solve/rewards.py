@@ -10,6 +10,7 @@ the absolute values: the *size* of r̄. Whether a choice pays at all is told by 
 from __future__ import annotations
 
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -44,6 +45,10 @@ class Paid(NamedTuple):
     """Where a part is above, and where one is below 0."""
     exact: Bools
     """Where r̄ was computed without rounding."""
+
+
+_TOTALS: WeakKeyDictionary[MDP, WeakKeyDictionary[Reward, Floats]] = WeakKeyDictionary()
+"""What is paid per choice, by models and their rewards: adding up a million branches takes longer than most that is asked of it."""
 
 
 def expected_reward(mdp: MDP, name: str | None) -> Floats:
@@ -109,6 +114,9 @@ def _total(mdp: MDP, reward: Reward, *, absolute: bool = False) -> Floats:
     """Return Σ of the parts per choice, or of their absolute values; what is said of choices alone as it is, not a copy."""
     if reward.choice is not None and reward.state is None and reward.branch is None:
         return np.abs(reward.choice) if absolute else reward.choice
+    kept = _TOTALS.setdefault(mdp, WeakKeyDictionary())
+    if not absolute and reward in kept:
+        return kept[reward]
     total = np.zeros(mdp.choices)
     with np.errstate(over="ignore", invalid="ignore"):
         for part, values in reward.parts():
@@ -119,6 +127,9 @@ def _total(mdp: MDP, reward: Reward, *, absolute: bool = False) -> Floats:
                 total += given
             else:
                 total += np.add.reduceat(given * mdp.branch_to_probability, mdp.choice_to_branches[:-1])
+    if not absolute:
+        total.flags.writeable = False
+        kept[reward] = total
     return total
 
 
