@@ -75,6 +75,31 @@ def test_who_cannot_turn_back_has_no_other_way_in_a_corridor(on: Read) -> None:
     assert [step.rank and step.rank.size for step in found.steps] == [np.inf] * 5
 
 
+@pytest.mark.kernels
+def test_going_round_for_ever_is_no_way_to_arrive(on: Read) -> None:
+    rows = [".....@.", ".....@.", "@......", ".....@."]  # one door, and before it much room to go round in
+    solution = on(rows, start="3,0", goal="5,2", objective='Pmax=? [F "goal"]')
+    found = rt.explain(solution, "naive-path", at_most=1)
+    door = found.steps[-1]
+    assert found.states[door.state].place == (4, 2)
+    assert door.rank is not None
+    assert (door.rank.size, door.rank.settled) == (1.0, True)
+
+
+def test_what_changes_nothing_ranks_below_what_changes_a_later_objective(on: Read) -> None:
+    rows = [
+        "......",
+        "@@.@@.",
+        "@@.@@.",
+        "@@.@@.",
+        "@@....",
+    ]  # two ways that are equal, then a way with nothing to decide
+    both = 'R{"time"}min=? [F "goal"] then R{"distance"}min=? [F "goal"]'
+    found = rt.explain(on(rows, start="0,0", goal="5,4", objective=both), "naive-path", at_most=1)
+    levels = {step.rank.level for step in found.steps if step.rank is not None and step.rank.size == 0.0}
+    assert levels == {1}
+
+
 @pytest.mark.parametrize("ranking", ["detour", "spread", "expected", "place"])
 def test_every_ranking_tells_as_much_as_there_is_room_for(on: Read, ranking: str) -> None:
     solution = on(ROOMS, start="1,0", goal="6,6", slip=0.2, directions=8)

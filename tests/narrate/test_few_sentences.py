@@ -14,7 +14,9 @@ import ratherthan as rt
 from ratherthan.explain.explanation import Explanation, LeftOut, Measured, ObjectiveRecord, StateRecord, Step
 from ratherthan.explain.question import question
 from ratherthan.factors import Interval
+from ratherthan.io.roadmap import parse_roadmap
 from ratherthan.model.lexicon import Lexicon
+from ratherthan.model.property import choose_objective
 from ratherthan.narrate import narrate, sentences
 from ratherthan.narrate.details import rounded
 
@@ -140,3 +142,67 @@ def test_what_is_rounded_stays_true(low: float, share: float) -> None:
 def test_without_a_number_of_sentences_the_text_is_as_it_was(kind: str) -> None:
     assert narrate(rt.explain(PAPER, kind)) == narrate(rt.explain(PAPER, asked=question(kind)))
     assert "We tell" not in narrate(rt.explain(PAPER, kind))
+
+
+def test_cells_are_counted_where_each_step_leads_to_the_next_one() -> None:
+    told = rt.explain(PAPER, "naive-path", at_most=9)
+    assert "We tell" not in narrate(told)
+    assert "for 2 cells to" in narrate(told)
+    places = {state: (2 * state, 0) for state in told.states}  # a map on which each step leaps over some cells
+    leaping = replace(told, states={s: replace(one, place=places[s]) for s, one in told.states.items()})
+    assert "cells" not in narrate(leaping)
+    ends = {s: replace(one, named=True, name=f"cells ({s}, 0) to ({s + 1}, 1)") for s, one in told.states.items()}
+    larger = narrate(replace(told, states=ends, lexicon=Lexicon()))
+    assert "for 2 steps until we reach cells (" in larger
+
+
+def test_a_chance_that_is_left_out_has_the_unit_of_the_details() -> None:
+    told = rt.explain(PAPER, at_most=1)
+    chance = ObjectiveRecord(kind="probability", maximise=True)
+    likely = replace(told, objective=chance, levels=(chance,))
+    said = left(likely, LeftOut(steps=3, largest=(0.3138,)))
+    assert "each of the others changes the chance to arrive by at most 31.38 percentage points." in said
+    assert "by at most 1 percentage point." in left(likely, LeftOut(steps=3, largest=(0.01,)))
+
+
+@pytest.mark.parametrize("kind", ["selective", "naive-path"])
+def test_a_detail_without_a_number_is_said_whatever_is_claimed(kind: str) -> None:
+    said = narrate(rt.explain(PAPER, kind, detail=True)).split(". ")
+    assert said[0].endswith("grid 5; moving north may fail to arrive")
+
+
+def test_a_run_past_dead_ends_says_so() -> None:
+    taken, aside = numbered("east", 4.0, 4.0), numbered("south", math.inf, math.inf, "dead end")
+    told = rt.explain(PAPER, "naive-path", at_most=9, detail=True)
+    run = next(sentence.steps for sentence in sentences(told) if len(sentence.steps) > 1)
+    for fate, words in (("dead end", "would lead to a dead end"), ("may fail", "may fail to arrive")):
+        other = replace(aside, fate=fate)
+        steps = [replace(one, numbers=((taken, other),)) if at in run else one for at, one in enumerate(told.steps)]
+        assert f"; any other action on the way {words}." in narrate(replace(told, steps=tuple(steps)))
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("line\nbreak", "line break"), ("a\r\n\u2028b", "a  b"), (" \n", "state 10"), ("", "state 10")]
+)
+def test_a_text_is_one_line_and_every_place_has_a_name(name: str, said: str) -> None:
+    told = rt.explain(PAPER, "naive-path")
+    states = {s: replace(one, named=True, name=name if s == 10 else f"s{s}") for s, one in told.states.items()}
+    text = narrate(replace(told, states=states, lexicon=Lexicon()))
+    assert len(text.splitlines()) == 1
+    assert f"we move east at {said}." in text
+
+
+def test_what_is_remembered_stands_between_commas() -> None:
+    town = parse_roadmap("map = '''\nS . . . .\n. . . . D\n'''\n", source="a town")
+    hurried = replace(town, objective=choose_objective(town, 'Pmax=? [F<=6 "destination"]'))
+    said = narrate(rt.explain(rt.solve(hurried), "naive-path", at_most=9))
+    assert said.startswith("First, we move east from grid 0, 6 steps left, for 4 cells to grid 4, 2 steps left")
+
+
+def test_of_a_run_an_exact_number_is_said_as_it_is() -> None:
+    told = rt.explain(PAPER, "naive-path", at_most=9, detail=True)
+    run = next(sentence.steps for sentence in sentences(told) if len(sentence.steps) > 1)
+    numbers = ((numbered("east", 4.0, 4.0), numbered("south", 115.0, 115.0), numbered("north", 5.5, 5.5)),)
+    steps = [replace(one, numbers=numbers) if at in run else one for at, one in enumerate(told.steps)]
+    said = narrate(replace(told, steps=tuple(steps)))
+    assert "; any other action on the way would add 1.5 to 111 to the distance." in said

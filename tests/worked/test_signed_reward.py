@@ -78,8 +78,9 @@ def test_why_not_another(small, explained):
     assert explained(problem, state=0, rather_than="gamble", factors=["responsibility"]) == (
         "We take detour rather than gamble at start because taking gamble may fail to arrive."
     )
-    assert explained(problem, kind="responsibility", state=0, detail=True).endswith(
-        "; taking gamble may fail to arrive."
+    assert explained(problem, kind="responsibility", state=0, detail=True) == (
+        "We take detour at start because it leads to the route with the most cost; "
+        "taking gamble may fail to arrive; taking direct instead would take 1 off the cost."
     )
 
 

@@ -100,8 +100,8 @@ def _by_detour(factors: Factors, route: Route, wanted: Sequence[int]) -> dict[in
         for at, detour in detours.items():
             size = float(numbers.action_value[route.choices[at]])
             nothing = abs(detour.loss) <= factors.asked.tolerance * abs(size) and detour.settled
-            if level == 0 or not (nothing or (detour.loss == np.inf and _alone(factors, level, route, at))):
-                found[at] = Rank(level=level, size=0.0 if nothing else detour.loss, settled=detour.settled)
+            if not nothing and (level == 0 or detour.loss != np.inf or not _alone(factors, level, route, at)):
+                found[at] = Rank(level=level, size=detour.loss, settled=detour.settled)
             if nothing and level < last:
                 left.append(at)
     rest = Rank(level=last, size=0.0)

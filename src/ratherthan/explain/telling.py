@@ -2,8 +2,8 @@
 
 Without a number of sentences that there may be, every step that is told has a sentence of its own. With one, steps in a row become
 one *run* where a sentence about all of them is true of each: they take the same action as often, all of them matter or none was
-asked whether it does, and their claims are alike in all that is said of a run. On a map each of them must lead one cell further
-in the same direction: a turn is a turn.
+asked whether it does, and their claims are alike in all that is said of a run. On a map each of them must lead in the same
+direction, as far as the one before: a turn is a turn.
 
 What a run says of its claims are their names, and of those that name alternatives, also which; their numbers differ from step to step
 and are left out.

@@ -20,7 +20,10 @@ __all__ = ["details", "rounded", "run_details"]
 
 NEAR = 1e-6
 """What agrees with a round number up to this share of it is said as that number."""
+EXACT = 1e-9
+"""The same for an end of a range that has more than two figures."""
 LEAST = 0.01
+FATES = ("dead end", "may fail")
 
 
 class _Difference(NamedTuple):
@@ -38,13 +41,17 @@ def details(words: Vocabulary, step: Step) -> str:
     table, on = words.table("details"), _on(words)
     parts = [str(table["only_way"])] * sum(claim.claim == "only way on" for claim in step.claims)
     for claim in step.claims:
-        for fate, key in (("dead end", "dead_end"), ("may fail", "may_fail" + ("_step" if on else ""))):
+        for fate in FATES:
             rows = claim.evidence.others if claim.claim == "avoids" else ()
             actions = [row.action for row in rows if isinstance(row, Measured) and row.fate == fate]
             if actions:
-                parts.append(str(table[key]).format(others=words.alternatives(actions)))
+                parts.append(str(table[_fate(fate, on)]).format(others=words.alternatives(actions)))
     groups: dict[str, list[str]] = {}
-    for action, found in _differences(words, step).items():
+    differences = _differences(words, step)
+    if "avoids" not in claims_at(step, 0):  # which was said above
+        for fate, actions in _lost(differences).items():
+            parts.append(str(table[_fate(fate, on)]).format(others=words.alternatives(actions)))
+    for action, found in differences.items():
         said = "" if found.bounds is None else _said(words, found.level, *found.bounds)
         if said:
             groups.setdefault(said, []).append(action)
@@ -62,10 +69,15 @@ def run_details(words: Vocabulary, steps: Sequence[Step]) -> str:
         return str(table["only_way"])
     known = [found for step in steps for found in _differences(words, step).values()]
     finite = [found for found in known if found.bounds is not None]
-    if not finite or len({found.level for found in finite}) > 1:
+    fates = {found.fate for found in known if found.bounds is None}
+    if None in fates or len({found.level for found in known}) != 1:
         return ""
-    if any(found.bounds is None and found.fate is None for found in known):
-        return ""
+    if not finite:
+        return (
+            str(table["run_" + _fate("dead end" if fates == {"dead end"} else "may fail", on)])
+            if not known[0].level
+            else ""
+        )
     level = finite[0].level
     turned = words.objectives[level].record.maximise
     ends = [(-b[1], -b[0]) if turned else b for b in (found.bounds for found in finite) if b is not None]
@@ -78,6 +90,21 @@ def run_details(words: Vocabulary, steps: Sequence[Step]) -> str:
     what = template.format(by=said, **words.objectives[level].words)
     key = ("run_unsure_step" if on else "run_unsure") if unsure else "run"
     return str(table[key]).format(what=what) + on
+
+
+def _lost(differences: Mapping[str, _Difference]) -> dict[str, list[str]]:
+    """Return the actions with which the first objective may not be reached, by what becomes of it."""
+    found: dict[str, list[str]] = {}
+    for fate in FATES:
+        actions = [action for action, one in differences.items() if one.fate == fate and one.level == 0]
+        if actions:
+            found[fate] = actions
+    return found
+
+
+def _fate(fate: str, on: str) -> str:
+    """Return which template says what becomes of it."""
+    return "dead_end" if fate == "dead end" else "may_fail_step" if on else "may_fail"
 
 
 def _along(words: Vocabulary, level: int, low: float, high: float) -> str:
@@ -181,12 +208,12 @@ def _decimals(value: float) -> int:
 
 
 def _outwards(value: float, *, up: bool) -> str:
-    """Return a number of two figures that is not smaller (not larger); what agrees with a round number is that number."""
+    """Return a number of two figures that is not smaller (not larger); what is one of two decimals is said as it is."""
     if value <= 0.0 or math.isinf(value):
         return "0"
     digits = _decimals(value)
     near = round(value, 2)
-    if abs(value - near) <= NEAR * value and round(near, digits) == near:
+    if abs(value - near) <= (NEAR if round(near, digits) == near else EXACT) * value:
         return _plain(near)
     step = 10.0**-digits
     return _plain(round((math.ceil(value / step) if up else math.floor(value / step)) * step, 2))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-__all__ = ["counted", "gerund", "joined", "qualified", "shortened", "verb_phrase_after"]
+__all__ = ["counted", "gerund", "joined", "names_several_cells", "qualified", "shortened", "verb_phrase_after"]
 
 _AS_IT_IS = ("be", "see", "flee", "agree", "free", "dye", "eye", "hoe", "shoe", "toe", "canoe", "singe", "tinge")
 _DOUBLED = ("begin", "forget", "reset", "admit", "permit", "commit", "submit", "transfer", "refer", "prefer", "quit")
@@ -44,6 +44,17 @@ def joined(parts: Sequence[str], word: str = "and") -> str:
     if len(parts) < 2:
         return "".join(parts)
     return ", ".join(parts[:-1]) + f" {word} " + parts[-1]
+
+
+def names_several_cells(place: str) -> bool:
+    """Return whether a place is several cells of the file, so that a count of cells would not say of which.
+
+    Examples
+    --------
+    >>> names_several_cells("cell (2, 3)"), names_several_cells("the crossing, cells (2, 4) to (3, 5)")
+    (False, True)
+    """
+    return re.search(r"\bcells \(", place) is not None
 
 
 def qualified(noun: str, adjective: str) -> str:

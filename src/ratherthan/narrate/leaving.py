@@ -31,6 +31,8 @@ def left_out(words: Vocabulary) -> list[str]:
     if level is not None and most is not None and left.unsure < left.steps and (level == 0 or not left.unsure):
         rest = "rest" + ("_one" if left.steps - left.unsure == 1 else "_many") if left.unsure else "each" + kind
         wanted = words.objectives[level].words
-        amount = words.language.counted(at_most(most) + wanted["unit"])
+        chance = words.objectives[level].record.chance  # said in hundredths, as the details are
+        unit = words.table("differences")["points"] if chance else wanted["unit"]
+        amount = words.language.counted(at_most(100.0 * most if chance else most) + unit)
         clauses.append(str(table[rest]).format(noun=wanted["noun"], largest=amount))
     return [said + "".join(clauses) + str(table["end"])]

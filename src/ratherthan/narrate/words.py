@@ -30,6 +30,7 @@ class Language:
     qualified: Callable[[str, str], str]
     shortened: Callable[[str], str]
     counted: Callable[[str], str]
+    names_several_cells: Callable[[str], bool]
 
 
 @cache
@@ -52,6 +53,7 @@ def language(code: str) -> Language:
         qualified=english.qualified,
         shortened=english.shortened,
         counted=english.counted,
+        names_several_cells=english.names_several_cells,
     )
 
 
@@ -99,7 +101,7 @@ class Vocabulary:
             if name in given or name in common:
                 phrase: str = given.get(name) or common[name]
                 return f"{phrase}{number}" if name != action else phrase
-        return str(self.table("phrases")["action"]).format(name=action)
+        return str(self.table("phrases")["action"]).format(name=_in_one_line(action))
 
     def doing(self, action: str) -> str:
         """Return the same as a gerund phrase: "moving east"."""
@@ -119,14 +121,14 @@ class Vocabulary:
         single = lexicon.states.get(record.name) or lexicon.states.get(str(state))
         if single:
             return single
-        phrases = self.table("phrases")
+        phrases, name = self.table("phrases"), _in_one_line(record.name)
         if lexicon.state:
             template = lexicon.state
-        elif not record.named:
+        elif not record.named or not name:
             template = phrases["state_number"]
         else:
-            template = phrases[_phrase_of(record.name)]
-        return template.replace("{number}", str(state)).replace("{name}", record.name)
+            template = phrases[_phrase_of(name)]
+        return template.replace("{number}", str(state)).replace("{name}", name)
 
     def places(self, states: Sequence[int], total: int | None = None, most: int = 5) -> str:
         """Return a list of states in words, shortened to `most`, of `total` in all."""
@@ -146,6 +148,11 @@ def _phrase_of(name: str) -> str:
     if name.strip("+-. ").isdigit():
         return "state_variables"  # a name that could be taken for a number stands beside the number
     return "state_name" if not variables else "state_variables" if variables <= MOST_VARIABLES else "state_number"
+
+
+def _in_one_line(name: str) -> str:
+    """Return a name without line breaks, and without blanks around it: the text of an explanation is one line."""
+    return " ".join(part.strip() for part in name.splitlines()).strip()
 
 
 def _without_number(action: str) -> tuple[str, str]:

@@ -184,7 +184,7 @@ def detours(rows: Rows, wish: Wish, way: Way, effort: Effort) -> tuple[Floats, B
                 # Sweeps, from far to near and back, until nothing changes.
                 if wish.counts_up:
                     for k in range(count):
-                        worth[k] = wish.never
+                        worth[k], taken[k] = wish.never, -1
                 resting, sweep = False, 0
                 while not resting and (spent < most or sweep < 2):
                     resting = True
@@ -226,7 +226,9 @@ def detours(rows: Rows, wish: Wish, way: Way, effort: Effort) -> tuple[Floats, B
                                     own = (paid + wish.discount * total) / (1.0 - wish.discount * stay)
                                 if own < low or best < 0:
                                     low, best = own, choice
-                        worth[k], taken[k] = low, best
+                        if not wish.counts_up or taken[k] < 0 or low < before - 1e-13 * abs(low):
+                            taken[k] = best  # of equal choices that which came to it first: others may go round
+                        worth[k] = low
                         if low != before and not abs(low - before) <= 1e-13 * abs(low):
                             resting = False
                     sweep += 1
