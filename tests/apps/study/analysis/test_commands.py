@@ -64,6 +64,20 @@ def test_analyse_ends_with_2_where_the_input_is_wrong(tmp_path):
     assert "cannot be made" in run("analyse", folder, "-o", tmp_path / "file", code=2)
 
 
+@pytest.mark.parametrize("number", ["nan", "-nan", "inf"])
+def test_numbers_that_are_none_are_refused(number, tmp_path):
+    folder = exports.write(exports.observations(3), tmp_path / "export")
+    for words in (
+        ("analyse", folder, "-o", tmp_path / "out", "--fastest"),
+        ("simulate", folder, "-o", tmp_path / "out", "--factor"),
+        ("power", "--factor"),
+        ("power", "--power"),
+        ("power", "--lost"),
+    ):
+        assert f"'{words[-1]}'" in run(*words, number, code=2)
+    assert not (tmp_path / "out").exists()
+
+
 def test_power_is_told_as_text_csv_and_json(tmp_path):
     few = ("--samples", 100, "--people", 60, "--item", "trust")
     text = run("power", *few)

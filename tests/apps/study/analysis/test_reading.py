@@ -69,6 +69,24 @@ def test_people_and_robots_are_never_mixed(rows, tmp_path):
         read_tidy(exports.write(rows, tmp_path / "c"))
 
 
+@pytest.mark.parametrize(
+    "told",
+    [
+        {
+            "kinds": [{"label": "no id"}, {"id": ["none"]}, 3],
+            "items": [{"options": [{"value": None}, 3]}],
+            "simulated": True,
+        },
+        {"kinds": 3, "items": "x", "title": {"a": 1}},
+    ],
+)
+def test_what_the_export_tells_of_the_study_may_be_spoiled(told, rows, tmp_path):
+    whole = read_tidy(exports.write(rows, tmp_path / "whole"))
+    data = read_tidy(exports.write(rows, tmp_path / "spoiled", study=told))
+    assert set(data.kinds) == set(whole.kinds)
+    assert [len(measure.value) for measure in data.measures] == [len(measure.value) for measure in whole.measures]
+
+
 def test_rows_twice_count_once_and_contradictions_are_said(rows, tmp_path):
     again = [dict(row) for row in rows[:4]]
     again[0]["value"] = "1" if rows[0]["value"] != "1" else "2"

@@ -126,6 +126,7 @@ def test_constant_answers_still_give_a_report(tmp_path):
         assert isinstance(result.primary, Lacking)
         assert isinstance(result.mixed, Lacking)
         assert isinstance(result.ordinal, Lacking)
+        assert {(summary.low, summary.high) for summary in result.summaries} == {(None, None)}
     text = " ".join(verdict.text for verdict in verdicts_of(found))
     assert "cannot be compared" in text
     assert "supported for responsibility" not in text

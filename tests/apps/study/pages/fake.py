@@ -6,6 +6,7 @@ It keeps everything in memory, answers with the headers that a strict policy dem
 from __future__ import annotations
 
 import json
+import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -114,6 +115,14 @@ class Fake:
         person.answers[screen.id] = given
         person.place += 1
         return self.reply(person)
+
+
+class Quiet(ThreadingHTTPServer):
+    """A browser that goes away in the middle is no error."""
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
 
 def handler(fake: Fake) -> type[BaseHTTPRequestHandler]:
@@ -231,7 +240,7 @@ def handler(fake: Fake) -> type[BaseHTTPRequestHandler]:
 @contextmanager
 def served(fake: Fake) -> Iterator[Fake]:
     """Serve `fake` on a free port of this machine."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler(fake))
+    server = Quiet(("127.0.0.1", 0), handler(fake))
     server.daemon_threads = True
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()

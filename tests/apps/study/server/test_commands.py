@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -46,7 +47,8 @@ class Served:
         for row in self.process.stdout:
             self.said += row
             if row.startswith("Stop with"):
-                break
+                return
+        raise AssertionError(self.process.communicate(timeout=30)[1])
 
     def link(self, pattern: str) -> str:
         found = re.search(pattern, self.said)
@@ -125,12 +127,38 @@ def test_the_default_database_lies_in_the_studys_folder(folder):
     assert "(simulated)" in run("export", folder, "-o", folder / "out", "--simulated")
 
 
+def certificate(place: Path) -> Path:
+    """Make a folder with a certificate and its key."""
+    if shutil.which("openssl") is None:
+        pytest.skip("needs openssl to make certificates")
+    place.mkdir()
+    made = "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -keyout key.pem -out cert.pem -days 1 -subj /CN=localhost"
+    subprocess.run(made.split(), cwd=place, check=True, capture_output=True)
+    return place
+
+
 def test_what_cannot_be_served_gets_one_sentence(folder, tmp_path):
     refused("serve", tmp_path / "nothing")
     assert "--private-key" in refused("serve", folder, "--certificate", folder / "design.toml")
     assert "no/cert.pem" in refused(
         "serve", folder, "--certificate", "no/cert.pem", "--private-key", folder / "design.toml"
     )
+    key, other = certificate(tmp_path / "one"), certificate(tmp_path / "other")
+    database = ("--database", tmp_path / "none.sqlite3")
+    for file, its in ((folder / "design.toml", key / "key.pem"), (other / "cert.pem", key / "key.pem")):
+        assert "PEM" in refused("serve", folder, *database, "--certificate", file, "--private-key", its)
+    for url in (
+        "javascript:alert(1)",
+        "",
+        "study.example.org",
+        "https://",
+        "https://x y",
+        "http://x:abc",
+        "http://x?y",
+    ):
+        assert "--url" in refused("serve", folder, *database, "--url", url)
+    for proxy in ("*", "not an address", ""):
+        assert "--proxy" in refused("serve", folder, *database, "--proxy", proxy)
     assert "folder" in refused("serve", folder, "--database", tmp_path / "no" / "a.sqlite3")
     assert "port" in refused("serve", folder, "--host", "203.0.113.77", "--port", "0")
     with socket.create_server(("127.0.0.1", 0)) as taken:

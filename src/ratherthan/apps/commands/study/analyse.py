@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from ratherthan.apps.commands.study.numbers import FiniteRange
 from ratherthan.apps.options import Command, argument, option
 
 EXAMPLES = (
@@ -44,7 +45,7 @@ EXAMPLES = (
 @option(
     "--fastest",
     section="Question",
-    type=click.FloatRange(min=0.0),
+    type=FiniteRange(min=0.0),
     default=2.0,
     metavar="SECONDS",
     help="Who is faster than this at half of the trials is left out.",

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from ratherthan.apps.commands.study.numbers import FiniteRange
 from ratherthan.apps.options import Command, option, output_options
 
 EXAMPLES = (
@@ -30,7 +31,7 @@ FORMS = ("text", "json", "csv")
 @option(
     "--factor",
     section="Question",
-    type=click.FloatRange(0.0, 100.0),
+    type=FiniteRange(0.0, 100.0),
     default=1.0,
     metavar="F",
     help="Multiply the model's differences between kinds; 0: none differ.",
@@ -47,7 +48,7 @@ FORMS = ("text", "json", "csv")
     "--power",
     "wanted",
     section="Question",
-    type=click.FloatRange(0.05, 0.999),
+    type=FiniteRange(0.05, 0.999),
     default=0.8,
     metavar="P",
     help="How often a difference is to be found.",
@@ -64,7 +65,7 @@ FORMS = ("text", "json", "csv")
 @option(
     "--lost",
     section="Question",
-    type=click.FloatRange(0.0, 0.95),
+    type=FiniteRange(0.0, 0.95),
     default=0.15,
     metavar="SHARE",
     help="The share of those who finish that will be left out, as they fail checks or are too fast.",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ratherthan.apps.commands.study.numbers import FiniteRange
 from ratherthan.apps.options import Command, argument, option
 
 EXAMPLES = (
@@ -35,7 +36,7 @@ EXAMPLES = (
 @option(
     "--factor",
     section="Question",
-    type=click.FloatRange(0.0, 100.0),
+    type=FiniteRange(0.0, 100.0),
     default=1.0,
     metavar="F",
     help="Multiply the model's differences between kinds; 0: none differ.",

@@ -201,7 +201,7 @@ def _summary(measure: Measure, kind: int, values: Floats) -> KindSummary:
     means = _means(measure, kind)
     centre = float(means.mean())
     low = high = None
-    if len(means) > 1:
+    if len(means) > 1 and np.ptp(means) > 1e-12 * abs(centre):  # persons who are all alike tell nothing of chance
         reach = float(t.ppf(0.975, len(means) - 1) * means.std(ddof=1) / np.sqrt(len(means)))
         low, high = centre - reach, centre + reach
     if measure.time:

@@ -185,7 +185,7 @@ def _without_repeats(table: Table, notes: list[str]) -> Iterator[Row]:
 
 def _ordered(found: set[str], told: Mapping[str, Any], notes: list[str]) -> tuple[str, ...]:
     """Return the kinds in the order of the design, else in that of the paper, the others behind."""
-    known = [str(kind["id"]) for kind in _entries(told, "kinds")]
+    known = [str(kind["id"]) for kind in _entries(told, "kinds") if kind.get("id")]
     order = known or list(KINDS)
     strangers = sorted(found - set(order))
     if known and strangers:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ipaddress
 import logging
+import ssl
 import sys
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import click
 
@@ -55,6 +58,7 @@ def serve_design(path: str, wanted: Wanted) -> None:
         Where the design has faults, or the database or the address cannot be had.
     """
     _check_https(wanted)
+    _check_addresses(wanted)
     design = read_design(path)
     database = wanted.database or str(default_database(design, simulated=wanted.simulated))
     if wanted.database is None and not design_file(path).is_file():
@@ -152,6 +156,39 @@ def _check_https(wanted: Wanted) -> None:
     for name, path in (("--certificate", wanted.certificate), ("--private-key", wanted.private_key)):
         if path is not None and not Path(path).is_file():
             raise InputError(f"{name} must be a file, but '{path}' is none.")
+    if wanted.certificate is None or wanted.private_key is None:
+        return
+    try:  # before a new database has got a password that would never be printed
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(wanted.certificate, wanted.private_key, _no_passphrase)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--certificate must be a certificate in PEM and --private-key its key without a passphrase, but '{wanted.certificate}' "
+            f"and '{wanted.private_key}' cannot be used: {getattr(error, 'reason', None) or error}."
+        ) from error
+
+
+def _no_passphrase() -> str:
+    raise ValueError("the key has a passphrase")
+
+
+def _check_addresses(wanted: Wanted) -> None:
+    """Refuse addresses that nobody could come to, or come from."""
+    if wanted.url is not None:
+        try:
+            parts = urlsplit(wanted.url)
+            good = parts.scheme in ("http", "https") and bool(parts.hostname) and not parts.query and not parts.fragment
+            good = (
+                good and (parts.port is None or parts.port > 0) and wanted.url.isprintable() and " " not in wanted.url
+            )
+        except ValueError:
+            good = False
+        if not good:
+            raise InputError(f"--url must be an address such as https://study.example.org, got '{wanted.url}'.")
+    if wanted.proxy is not None:
+        try:
+            ipaddress.ip_network(wanted.proxy, strict=False)
+        except ValueError as error:
+            raise InputError(f"--proxy must be the IP address of a machine, got '{wanted.proxy}'.") from error
 
 
 def _log(*, every: bool) -> None:
