@@ -32,6 +32,19 @@ MODULES = sorted(
     for path in (SOURCE / "ratherthan").rglob("*.py")
     if path.name != "__main__.py" and "migrations" not in path.parts  # these run within Alembic alone
 )
+# What modules may import that the package alone does not bring.
+OPTIONAL = {
+    "argon2",
+    "alembic",
+    "gymnasium",
+    "httpx",
+    "itsdangerous",
+    "pyarrow",
+    "sqlalchemy",
+    "starlette",
+    "stormpy",
+    "uvicorn",
+}
 OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 # A fixed width and no colours: what is printed depends on nothing but the program.
 SURROUNDINGS = {
@@ -177,7 +190,7 @@ def test_the_docstrings_show_what_comes(name, tmp_path, monkeypatch):
     try:
         module = importlib.import_module(name)
     except ModuleNotFoundError as error:
-        if (error.name or "").partition(".")[0] not in ("stormpy", "pyarrow", "gymnasium"):
+        if (error.name or "").partition(".")[0] not in OPTIONAL:
             raise
         pytest.skip(f"{name} needs {error.name}, which is not installed")
     monkeypatch.chdir(tmp_path)

@@ -150,6 +150,7 @@ def until(running: subprocess.Popen[bytes], word: bytes) -> None:
     raise AssertionError(f"the process ended before it said {word!r}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", STUCK)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_what_python_cannot_interrupt_is_ended_all_the_same(tmp_path, place, number):
@@ -163,6 +164,7 @@ def test_what_python_cannot_interrupt_is_ended_all_the_same(tmp_path, place, num
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["in a compiled kernel", "in a loop that catches everything"])
 def test_a_time_limit_ends_what_python_cannot_interrupt(tmp_path, place):
     running = started("solve", "x", "--time-limit", "1s", code=WORK.format(work=STUCK[place]))

@@ -252,6 +252,7 @@ def test_packed_files_are_read(tmp_path, assert_equal):
     assert "one file" in refusal(tmp_path / "two.drn.gz")
 
 
+@pytest.mark.slow
 def test_a_bomb_is_refused(tmp_path):
     (tmp_path / "bomb.drn.gz").write_bytes(gzip.compress(SMALL.encode() + b"\n" * (100 << 20)))
     assert "must unpack to at most" in refusal(tmp_path / "bomb.drn.gz")

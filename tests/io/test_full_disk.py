@@ -48,6 +48,7 @@ WRITERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a limit of file sizes")
 @pytest.mark.parametrize("old", [None, b"what was there before"])
 @pytest.mark.parametrize("name", WRITERS)

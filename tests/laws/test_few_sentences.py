@@ -26,11 +26,11 @@ from ratherthan.explain.route import route_from
 from ratherthan.explain.shared import graph_of
 from ratherthan.explain.telling import matters, told_groups
 from ratherthan.explain.visits import chances_to_visit
-from ratherthan.model.objective import ExpectedCost, ReachAvoid
+from ratherthan.model.objective import Discounted, ExpectedCost, ReachAvoid
 from ratherthan.model.problem import Problem
 from ratherthan.narrate import from_json, narrate, sentences, to_json
 from ratherthan.solve import Solution, evaluate, solve
-from ratherthan.verify import verify
+from ratherthan.verify import detours, verify
 
 MODELS = int(os.environ.get("RATHERTHAN_MODELS", "300"))
 CHUNK = 30
@@ -201,7 +201,7 @@ def test_what_is_told_in_few_sentences_is_told_in_more_of_them(first: int) -> No
 @pytest.mark.parametrize("ranking", RANKINGS)
 def test_few_sentences_are_confirmed_by_the_re_checker(ranking: str) -> None:
     left = ranks = 0
-    for seed in range(MODELS // 2):
+    for seed in range(max(30, MODELS // 4)):
         random, problem, solution = solution_of(seed)
         kind = random.choice(["naive-path", "selective", "contrastive"])
         found = explain(solution, kind, at_most=1, ranking=ranking, detail=random.random() < 0.5)
@@ -212,6 +212,27 @@ def test_few_sentences_are_confirmed_by_the_re_checker(ranking: str) -> None:
         ranks += any(step.rank is not None for step in found.steps)
     assert left > 0
     assert bool(ranks) == (ranking != "place")
+
+
+def test_a_detour_under_a_discount_is_confirmed_whether_equations_help_its_sweeps_or_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    compared = 0
+    for seed in range(400):
+        _, problem, solution = solution_of(seed)
+        if not isinstance(problem.objective, Discounted) or problem.objective.discount > 0.99:
+            continue
+        found = explain(solution, "naive-path", at_most=1)
+        document = json.loads(json.dumps(to_document(found, narrate(found))))
+        seen = []
+        for patience in (1, 2, 10**9):
+            monkeypatch.setattr(detours, "PATIENCE", patience)
+            verdicts = verify(document, problem)
+            seen.append((verdicts.fails, list(map(str, verdicts.checks))))
+        assert seen[0] == seen[1] == seen[2]
+        assert not seen[0][0], seed
+        compared += any(step.rank is not None for step in found.steps)
+    assert compared > 5
 
 
 @pytest.mark.parametrize("first", range(0, MODELS, CHUNK))

@@ -72,6 +72,7 @@ def harmless(mutant: Mutant, case: Case) -> bool:
 BOTH = pytest.mark.parametrize("case_of", [random_case, random_rich_case], ids=["plain", "rich"])
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("seed", range(CASES))
 def test_every_change_breaks_the_seal(seed: int, case_of: Callable[[int], Case]) -> None:

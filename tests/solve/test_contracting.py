@@ -104,7 +104,8 @@ def test_large_models_are_answered_as_small_ones(seed: int, level: Level, reques
     request.getfixturevalue("at_any_size")
     large = solve(problem)
     assert np.allclose(small.values[0], large.values[0], rtol=1e-6, atol=1e-6)
-    assert (small.lower[0] <= large.upper[0]).all() and (large.lower[0] <= small.upper[0]).all()
+    assert (small.lower[0] <= large.upper[0]).all()
+    assert (large.lower[0] <= small.upper[0]).all()
     assert (small.policy.choice == large.policy.choice).all()
     assert large.outcome is small.outcome
 

@@ -75,6 +75,7 @@ def test_every_method_solves_a_chain(name: str, seed: int) -> None:
         assert abs(Fraction(float(high)) + Fraction(float(low)) - value) <= Fraction(1e-13) * value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["dense elimination", "elimination"])
 @pytest.mark.parametrize("forward", [0.4, 0.2, 0.1])
 def test_elimination_keeps_its_digits_where_a_walk_takes_1e18_steps(name: str, forward: float) -> None:

@@ -142,6 +142,7 @@ def test_a_plan_that_beats_both_ends_is_the_only_one(discount):
     assert found.bounded.plan.values == pytest.approx(found.plans[0].values)
 
 
+@pytest.mark.slow
 def test_an_end_that_is_beaten_makes_way_whichever_of_several_best_plans_is_found(monkeypatch):
     """Of several plans that are best for one cost alone, the solver may return the worst for the other."""
     weigh = Weighing.best

@@ -329,6 +329,7 @@ def test_a_given_policy_is_told_as_sharply(seed: int) -> None:
     assert (solution.policy_upper - solution.policy_lower <= 1e-6).all()
 
 
+@pytest.mark.slow
 @pytest.mark.kernels
 @pytest.mark.parametrize("leak", [1e-9, 1e-30, 1e-100])
 @pytest.mark.parametrize("maximise", [False, True])

@@ -136,6 +136,7 @@ def same(frame: Frame, share: float) -> int:
     return int((finite & ~known).sum() + wrong.sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["dense", "sparse", "value iteration"])
 def test_sweeps_agree_with_fractions(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if way != "dense":

@@ -19,6 +19,8 @@ __all__ = ["Found", "Sweeps"]
 MOST_WORK, MOST_BRANCHES = 20_000_000, 200_000
 """So many branches are gone through at most, for all steps together, and so many a model may have."""
 STILL = 1e-12
+PATIENCE, MOST_TOGETHER = 100, 400
+"""After so many sweeps of a discounted sum, what its best choices so far come to is found at once, for at most so many states."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,9 @@ class Sweeps:
             self.work -= rounds * len(rows.target)
             now[lost] = np.inf
         price, limit = self._sign * frame.price[rows.row], frame.discount
+        sweeps = 0
         while self.work > 0:
+            sweeps += 1
             self.work -= len(rows.target)
             near = np.where(rows.stays, now[rows.origin], now[rows.target])
             near = np.where(rows.shut, np.maximum(now[rows.origin], worth[rows.target]), near)
@@ -110,6 +114,9 @@ class Sweeps:
             if changed:
                 sure = not hard or bool((frame.price[rows.row] * self._sign > 0.0).all())
                 return Found(value=self._sign * float(now[state]), sure=sure)
+            if limit < 1.0 and sweeps % PATIENCE == 0 and len(place) <= MOST_TOGETHER:
+                self.work -= len(place) ** 2
+                now[place] = rows.followed(place, total, now, worth, price=price, limit=limit)
         return None
 
 
@@ -149,6 +156,32 @@ class _Rows:
             stays=stays,
             shut=shut[target] & ~stays,
         )
+
+    def followed(
+        self, place: Array, total: Floats, now: Floats, worth: Floats, *, price: Floats, limit: float
+    ) -> Floats:
+        """Return what states come to if each goes on with the best of its choices, by values `now`: one system of equations.
+
+        Under a discount it has one answer, and sweeps from anywhere come to the same end.
+        """
+        by_size = np.lexsort((total, self.state))
+        best = np.zeros(len(self.row), dtype=np.bool_)
+        best[by_size[np.flatnonzero(np.diff(self.state[by_size], prepend=-1))]] = True
+        counts = np.diff(np.append(self.first, len(self.target)))
+        entry = np.repeat(best, counts)
+        number = np.full(len(now), -1, dtype=np.int64)
+        number[place] = np.arange(len(place))
+        origin, target, share = self.origin[entry], self.target[entry], limit * self.share[entry]
+        back = self.stays[entry] | (self.shut[entry] & (now[origin] >= worth[target]))
+        known = ~back & (self.shut[entry] | (number[target] < 0))
+        matrix, right = np.eye(len(place)), np.zeros(len(place))
+        right[number[self.state[best]]] = price[best]
+        away = np.where(self.shut[entry], worth[target], now[target])
+        np.add.at(right, number[origin[known]], (share * away)[known])
+        inner = ~known
+        to = np.where(back, origin, target)
+        np.subtract.at(matrix, (number[origin[inner]], number[to[inner]]), share[inner])
+        return np.asarray(np.linalg.solve(matrix, right))
 
     def lost(self, worth: Floats, most: int) -> tuple[Array, int]:
         """Return the states from which no choices are sure to lead out of what they can come to, and how many rounds that took.

@@ -71,6 +71,7 @@ def test_a_scenario_for_another_map_is_refused(tmp_path):
         read_gridmap(tmp_path / "mine.map", Drive(scenario=str(tmp_path / "a.scen")))
 
 
+@pytest.mark.slow
 def test_without_slips_the_expected_distance_is_the_published_length(shared_data):
     folder = shared_data / "maps" / "movingai"
     tried = 0

@@ -49,6 +49,7 @@ def test_the_shortest_ways_on_the_models_moves_have_the_published_lengths(shared
         assert dijkstra(graph, indices=start)[goal] == pytest.approx(way.length, rel=SIX_DIGITS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "scen"), [(name, scen) for name, scen, _ in MAPS if "512" not in name])
 def test_the_expected_distance_is_the_published_length(shared_data, name, scen):
     folder = shared_data / "maps" / "movingai"

@@ -352,6 +352,7 @@ SPOILED = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_whatever_is_spoiled_the_rest_is_reported_without_a_number_that_is_none(seed, tmp_path):
     random = np.random.default_rng(seed)

@@ -89,6 +89,7 @@ def _corridor(folder, cells):
     return file
 
 
+@pytest.mark.slow
 def test_a_route_that_is_too_long_to_be_told_says_how_it_can_be(tmp_path):
     source = str(_corridor(tmp_path, 1200))
     with pytest.raises(DesignError, match=r"at_most = 7 .* \(--at-most 7 "):
