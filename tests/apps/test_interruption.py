@@ -248,6 +248,18 @@ def test_the_terminal_is_as_it_was(tmp_path):
     assert shown.rindex(b"\x1b[?25h") > shown.rindex(b"\x1b[?25l")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="signals cannot be sent to a process of its own there")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("working", [False, True])
+def test_a_signal_between_two_that_catch_it_ends_the_command_in_silence(number, working):
+    code = (
+        "import os, sys, time\nfrom ratherthan.apps import guard\n"
+        f"guard.stand_guard(print).working = {working}\nos.kill(os.getpid(), {int(number)})\ntime.sleep(20)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (CODES[number], b"", b"")
+
+
 def test_standing_guard_costs_a_start_next_to_nothing():
     code = (
         "import time, threading\nfrom ratherthan.apps import guard\nbegun = time.process_time()\n"

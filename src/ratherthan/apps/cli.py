@@ -74,6 +74,7 @@ def run() -> None:
     standing = stand_guard(say)
     tally.announce = say
     try:
+        standing.working = True
         main(prog_name="ratherthan")
     except KeyboardInterrupt:
         silence(sys.stdout, sys.stderr)
@@ -87,5 +88,6 @@ def run() -> None:
             standing.end(1)
         raise
     finally:
+        standing.working = False
         if standing.signal:  # nothing is waited for, not even that a large model is forgotten
             standing.end(standing.code)

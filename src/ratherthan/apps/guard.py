@@ -24,7 +24,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from types import FrameType
+from types import FrameType, TracebackType
 from typing import Any
 
 from ratherthan.errors import LimitError
@@ -70,6 +70,7 @@ class Guard:
         self.signal = 0
         self.heard = 0.0
         self.raised = False
+        self.working = False
         self.answering = False
         self.interrupts = 0
         self.watch: Watch | None = None
@@ -95,7 +96,7 @@ class Guard:
         for number in _heard():
             if number != getattr(signal, "SIGHUP", None) or signal.getsignal(number) != signal.SIG_IGN:  # nohup
                 signal.signal(number, self.on_signal)
-        sys.unraisablehook = self.on_unraisable
+        sys.unraisablehook, sys.excepthook = self.on_unraisable, self.on_uncaught
         threading.Thread(target=self.listen, name="guard", daemon=True).start()
 
     def cause(self, error: BaseException) -> BaseException:
@@ -114,6 +115,9 @@ class Guard:
         """Interrupt the main thread: once, as it must not be interrupted while it clears up."""
         while self.answering:  # the other thread speaks, and ends the process
             time.sleep(TICK)
+        if not self.working:  # nothing is under way, or not any more: nobody would catch what is raised
+            self.signal = self.signal or number
+            self.end(self.code)
         if self.raised:
             return
         if self.limit is not None and self.watch is not None and self.interrupts and not self.heard:
@@ -123,6 +127,12 @@ class Guard:
             raise self.limit
         self.raised, self.signal = True, self.signal or number
         raise KeyboardInterrupt if number == signal.SIGINT else Terminated(number)
+
+    def on_uncaught(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        """End the process where an interrupt came in the moment between two that would have caught it."""
+        if self.signal and issubclass(kind, KeyboardInterrupt):
+            self.end(self.code)
+        sys.__excepthook__(kind, error, trace)
 
     def on_unraisable(self, told: Any) -> None:
         """Have the thread interrupt once more where the interrupt came at a place that swallows every error."""
