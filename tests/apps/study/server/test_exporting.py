@@ -12,7 +12,7 @@ from apps.study.designs import small_design
 from apps.study.server.visitors import in_phase
 
 from ratherthan.apps.study.server.archive import design_of, text_of
-from ratherthan.apps.study.server.exporting import safe_cell, tables_of, written
+from ratherthan.apps.study.server.exporting import tables_of, written
 from ratherthan.apps.study.server.opening import existing
 
 
@@ -106,26 +106,6 @@ def test_cells_that_look_like_formulas_are_disarmed_in_csv_alone(several, databa
     for row, other in zip(observed, table, strict=True):
         assert row["participant"] == other["participant"]
         assert row["number"] == str(other["number"])
-
-
-@pytest.mark.parametrize(
-    ("value", "cell"),
-    [
-        ("=1", "'=1"),
-        ("+1", "+1"),
-        ("-1.5", "-1.5"),
-        ("-1+2", "'-1+2"),
-        ("@x", "'@x"),
-        ("\tx", "'\tx"),
-        ("plain", "plain"),
-        ("", ""),
-        (None, ""),
-        (-3, "-3"),
-        (False, "false"),
-    ],
-)
-def test_safe_cells(value, cell):
-    assert safe_cell(value) == cell
 
 
 def test_every_column_and_item_is_in_the_codebook(several, database, tmp_path):

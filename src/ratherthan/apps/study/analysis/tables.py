@@ -8,6 +8,7 @@ import math
 import re
 from pathlib import Path
 
+from ratherthan.apps.study.cells import bare_cell
 from ratherthan.errors import MissingExtraError, SourceError
 
 __all__ = ["Table", "number_in", "read_table"]
@@ -95,7 +96,7 @@ def _csv(text: str, path: Path) -> Table:
         ) from error
     _check_names(head, path)
     columns = list(zip(*rows, strict=True)) if rows else [() for _ in head]
-    return {name: [_unguarded(cell.strip()) for cell in column] for name, column in zip(head, columns, strict=True)}
+    return {name: [bare_cell(cell.strip()) for cell in column] for name, column in zip(head, columns, strict=True)}
 
 
 def _check_names(head: list[str], path: Path) -> None:
@@ -105,11 +106,6 @@ def _check_names(head: list[str], path: Path) -> None:
     if twice or head.count("") > 1:
         what = f"'{twice[0]}' stands there twice" if twice else "several have none"
         raise SourceError(f"Every column of a table must have a name of its own; in '{path.name}' {what}.", path=path)
-
-
-def _unguarded(cell: str) -> str:
-    """Return a cell without the quote that keeps spreadsheets from taking it for a formula."""
-    return cell[1:] if len(cell) > 1 and cell[0] == "'" and cell[1] in "=+-@\t\r" else cell
 
 
 def _parquet(path: Path) -> Table:

@@ -21,6 +21,7 @@ from typing import Any
 
 from sqlalchemy import Connection, Row, func, select
 
+from ratherthan.apps.study.cells import safe_cell
 from ratherthan.apps.study.design.codebook import codebook
 from ratherthan.apps.study.design.nouns import Design, Record, Screen
 from ratherthan.apps.study.server.course import Course, Way
@@ -30,11 +31,9 @@ from ratherthan.apps.study.server.sessions import gap, milliseconds
 from ratherthan.apps.study.server.tables import ANSWER, ATTEMPT, PARTICIPANT, STUDY
 from ratherthan.apps.study.server.values import all_correct
 
-__all__ = ["FILES", "packed", "safe_cell", "tables_of", "written"]
+__all__ = ["FILES", "packed", "tables_of", "written"]
 
 Table = dict[str, list[Any]]
-NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 
 
 @cache
@@ -140,22 +139,6 @@ def written(connection: Connection, design: Design, folder: Path) -> dict[str, A
     return facts
 
 
-def safe_cell(value: Any) -> str:
-    """Return a value as a cell of CSV that no spreadsheet takes for a formula.
-
-    Examples
-    --------
-    >>> safe_cell("=1+1"), safe_cell("-3"), safe_cell(None), safe_cell(True)
-    ("'=1+1", '-3', '', 'true')
-    """
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    text = str(value)
-    return f"'{text}" if text.startswith(FORMULAS) and not NUMBER.fullmatch(text) else text
-
-
 def _contents(connection: Connection, design: Design) -> Iterator[tuple[str, bytes]]:
     """Yield the files of an export."""
     observed, known, facts = tables_of(connection, design)
@@ -188,7 +171,7 @@ def _about(who: Row[Any], answered: int, course: Course) -> dict[str, Any]:
         "attention_failed": who.failed,
         "repeated": who.repeated,
         "entered": dt.datetime.fromtimestamp(who.entered / 1000, dt.UTC).date().isoformat(),
-        "minutes": round(((who.ended or who.seen) - who.entered) / 60_000, 2),
+        "minutes": round(max(0, (who.ended or who.seen) - who.entered) / 60_000, 2),
     }
 
 

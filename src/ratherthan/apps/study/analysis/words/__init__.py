@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -16,19 +17,28 @@ def _words() -> dict[str, Any]:
 
 
 def say(key: str, **values: object) -> str:
-    """Return the text at a key such as "notes.twice", its places filled in.
+    """Return the text at a key such as "notes.twice", its places filled in, and what is counted in the singular where it is one.
 
     Examples
     --------
     >>> say("tables.kind")
     'Explanation'
+    >>> say("tests.sign_value", first=1, count=1), say("tests.sign_value", first=1, count=21)
+    ('1 of 1 person', '1 of 21 persons')
     """
     found: Any = _words()
     for part in key.split("."):
         found = found[part]
     if not isinstance(found, str):
         raise KeyError(f"no text at {key}")
-    return " ".join(found.format(**values).split())
+    return _one().sub(lambda hit: _words()["forms"]["one"][hit[1]], " ".join(found.format(**values).split()))
+
+
+@functools.cache
+def _one() -> re.Pattern[str]:
+    """Return what finds "persons" after a one that is no part of a number."""
+    plurals = "|".join(_words()["forms"]["one"])
+    return re.compile(rf"(?<=(?<![\d.,−-])1 )({plurals})\b")
 
 
 def listed(parts: list[str] | tuple[str, ...]) -> str:
