@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import os
+from dataclasses import replace
 from fractions import Fraction
 from random import Random
 from typing import Any
@@ -19,6 +20,7 @@ from random_models import OBJECTIVES, random_policy, random_problem, random_rich
 from ratherthan.errors import ExplanationError
 from ratherthan.explain import explain, question
 from ratherthan.explain.detour import detours_of
+from ratherthan.explain.explanation import Rank
 from ratherthan.explain.measures import Factors
 from ratherthan.explain.question import RANKINGS, Question
 from ratherthan.explain.record import to_document
@@ -26,6 +28,7 @@ from ratherthan.explain.route import route_from
 from ratherthan.explain.shared import graph_of
 from ratherthan.explain.telling import matters, told_groups
 from ratherthan.explain.visits import chances_to_visit
+from ratherthan.io.roadmap import parse_roadmap
 from ratherthan.model.objective import Discounted, ExpectedCost, ReachAvoid
 from ratherthan.model.problem import Problem
 from ratherthan.narrate import from_json, narrate, sentences, to_json
@@ -252,6 +255,43 @@ def test_the_chance_to_come_to_a_state_is_that_of_the_chain(first: int) -> None:
             own = [None if s == state else row for s, row in enumerate(chain)]
             exact = chain_values(own, [state], cost=False)[start]
             assert chance == pytest.approx(float(exact), abs=1e-9), (seed, state)
+
+
+IN_ORDER = (
+    """\
+property = 'R{"distance"}min=? [F "destination"] then R{"time"}min=? [F "destination"]'
+map = """
+    "'''"
+    """
+S . . .
+. = . .
+. . . .
+. . . D
+"""
+    "'''"
+    """
+[costs]
+distance = 1
+time = { other = 2, highway = 1 }
+"""
+)
+
+
+def test_a_rank_says_at_which_level_something_differs() -> None:
+    problem = parse_roadmap(IN_ORDER, source="in order")
+    found = explain(solve(problem), "naive-path", at_most=2)
+    later = [at for at, step in enumerate(found.steps) if step.told and step.rank is not None and step.rank.level == 1]
+    assert later
+    for at in later:
+        for size, level in ((0.0, 0), (1e-300, 0)):
+            steps = list(found.steps)
+            steps[at] = replace(steps[at], rank=Rank(level=level, size=size))
+            forged = replace(found, steps=tuple(steps))
+            verdicts = verify(json.loads(json.dumps(to_document(forged, narrate(forged)))), problem)
+            assert verdicts.fails
+            assert any(check.what == "rank" and "does not differ" in check.reason for check in verdicts.checks)
+    document = json.loads(json.dumps(to_document(found, narrate(found))))
+    assert verify(document, problem).holds
 
 
 NEW = ("told", "rank", "numbers", "left_out", "at_most")

@@ -116,7 +116,7 @@ class Evaluator:
         if name == "deadlock":
             return deadlocks(self.mdp)
         raise PropertyError(
-            f"A label must be one of the model's: {one_of(name, [*self.mdp.labels, 'init', 'deadlock'])}; got '{name}'.",
+            f"A label must be one of the model's: {one_of(name, {**self.mdp.labels, 'init': (), 'deadlock': ()})}; got '{name}'.",
             label=name,
         )
 

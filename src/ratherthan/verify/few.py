@@ -206,12 +206,17 @@ class FewCheck:
             size = max((abs(x) for x in (found.value, taken) if math.isfinite(x)), default=0.0)
             if rank.level > level and math.isfinite(loss) and abs(loss) <= 10 * levels.asked.tolerance * size:
                 continue  # nothing, or next to nothing, at this level
+            if rank.settled and rank.level == level < last and abs(rank.size) <= self._nearly_nothing(taken):
+                return f"it does not differ at level {level + 1}, and the next must be looked at", False
             if not rank.settled:
                 low = rank.level == level and rank.size <= loss + NEAR * size
                 return (None if low or not found.sure else f"it is at most {loss:.10g}, got {rank.size:.10g}"), not low
             flaw, is_open = self._agrees(rank, level, loss, loss, size if math.isfinite(size) else 0.0)
             return (flaw, is_open) if found.sure else (None, flaw is not None or is_open)
         return None, True
+
+    def _nearly_nothing(self, taken: float) -> float:
+        return 0.1 * self.levels.asked.tolerance * abs(taken) if math.isfinite(taken) else 0.0
 
     # -- what is left out
 
