@@ -49,7 +49,7 @@ run: $(VENV)/.ready  ## Set up, then explain the paper's map: printed, written t
 test: check $(BARE)/.package  ## Set up, then run all checks and all tests
 	$(BIN)/pytest -n $(JOBS)
 	RATHERTHAN_COMPILE=always $(BIN)/pytest -n $(JOBS) -m kernels
-	RATHERTHAN_MODELS=40 RATHERTHAN_COMPILE=never NUMBA_DISABLE_JIT=1 $(BARE)/bin/pytest -n $(JOBS) -m 'not slow' --hypothesis-profile=quick
+	RATHERTHAN_MODELS=20 RATHERTHAN_COMPILE=never NUMBA_DISABLE_JIT=1 $(BARE)/bin/pytest -n $(JOBS) -m 'not slow' --hypothesis-profile=quick
 
 check: $(VENV)/.ready  ## Format, lint, types, walls, and docs in step with the code
 	$(BIN)/ruff format --check

@@ -30,6 +30,10 @@ FLAGS = ["--disable-dev-shm-usage", "--disable-gpu", "--hide-scrollbars"]
 SETTLE = "new Promise(done => setTimeout(() => setTimeout(done), 10))"  # what happened by now is told by then
 WATCH = """document.addEventListener("securitypolicyviolation", event =>
     console.error(`policy violated: ${event.violatedDirective} by ${event.blockedURI || event.sample}`));"""
+AT_REST = """() => Promise.all(document.getAnimations()
+    .filter(one => one.effect.getComputedTiming().endTime < Infinity).map(one => one.finished.catch(() => null)))
+    .then(() => null)"""
+"""Waits until nothing fades any more that comes to an end."""
 
 
 @dataclass(kw_only=True)
@@ -43,6 +47,7 @@ class Seen:
         """Return what axe-core finds fault with, by all of its rules that are on by default, a sentence for each place."""
         from axe_playwright_python.sync_playwright import Axe
 
+        self.page.evaluate(AT_REST)  # colours between two are nobody's fault
         found = Axe().run(self.page).response["violations"]
         return [
             f"{rule['id']}: {rule['help']} at {' '.join(map(str, node['target']))}: {node['html'][:120]}"

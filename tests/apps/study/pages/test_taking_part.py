@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 import pytest
-from apps.study.pages.walking import at, go, go_to, past, ready, shown
+from apps.study.pages.walking import again, at, go, go_to, past, ready, shown
 
 from ratherthan.apps.study.design.nouns import Card, Option, Record, Screen
 
@@ -188,7 +188,7 @@ def test_an_answer_waits_until_the_server_is_back(visit, serve, listed, away):
         assert page.locator("input:checked").count() == 2, "what was answered stays in its place"
         page.get_by_role("button", name="Continue").click()  # impatience does nothing
         fake.away = None
-        page.get_by_role("button", name="Try again now").click()
+        again(page)
         past(page, "trial-m1-naive-path")
         assert page.locator("#saving").inner_text() == ""
         seen.faults[:] = [
@@ -251,7 +251,7 @@ def test_an_answer_outlives_a_reload_while_the_server_is_away(visit, serve, list
         page.reload()
         page.get_by_text("The study cannot be reached, trying again.").wait_for()
         fake.away = None
-        page.get_by_role("button", name="Try again now").click()
+        again(page)
         past(page, "trial-m1-naive-path")
         seen.faults[:] = [
             fault for fault in seen.faults if not fault.startswith("console error: Failed to load resource")
@@ -459,7 +459,7 @@ def test_a_study_that_is_paused_goes_on_later(visit, serve, listed):
         at(seen.page, "paused")
         assert seen.axe() == []
         fake.paused = False
-        seen.page.get_by_role("button", name="Try again now").click()
+        again(seen.page)
         at(seen.page, "consent")
 
 

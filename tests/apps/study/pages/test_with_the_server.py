@@ -16,7 +16,7 @@ pytest.importorskip("starlette", reason="needs the extra study")
 pytest.importorskip("uvicorn", reason="needs the extra study")
 
 from apps.study.designs import small_design
-from apps.study.pages.walking import at, go, go_to, past, ready
+from apps.study.pages.walking import again, at, go, go_to, past, ready
 
 from ratherthan.apps.study.server.opening import opened
 from ratherthan.apps.study.server.researchers import entrance
@@ -250,5 +250,5 @@ def test_a_paused_study_lets_nobody_begin_and_everybody_finish(visit, running):
         assert seen.axe() == []
         researcher.get_by_role("button", name="Let the study go on").click()
         researcher.get_by_text("The study goes on.").wait_for()
-        page.get_by_role("button", name="Try again now").click()
+        again(page)
         at(page, "consent")

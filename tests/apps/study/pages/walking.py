@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+AGAIN = "Try again now"
+
 
 def at(page: Any, screen: str) -> Any:
     """Wait until a screen is shown, and return its article."""
@@ -26,6 +28,11 @@ def past(page: Any, screen: str) -> str:
         arg=screen,
     )
     return shown(page)
+
+
+def again(page: Any) -> None:
+    """Try again now, if the page has not by itself: then the button is gone."""
+    page.evaluate("name => [...document.querySelectorAll('button')].find(b => b.textContent === name)?.click()", AGAIN)
 
 
 def ready(page: Any) -> None:

@@ -31,13 +31,13 @@ def say(key: str, **values: object) -> str:
         found = found[part]
     if not isinstance(found, str):
         raise KeyError(f"no text at {key}")
-    return _one().sub(lambda hit: _words()["forms"]["one"][hit[1]], " ".join(found.format(**values).split()))
+    return _one().sub(lambda hit: _words()["singular"][hit[1]], " ".join(found.format(**values).split()))
 
 
 @functools.cache
 def _one() -> re.Pattern[str]:
     """Return what finds "persons" after a one that is no part of a number."""
-    plurals = "|".join(_words()["forms"]["one"])
+    plurals = "|".join(_words()["singular"])
     return re.compile(rf"(?<=(?<![\d.,−-])1 )({plurals})\b")
 
 
